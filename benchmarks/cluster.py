@@ -30,7 +30,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
 
 import jax
-from simulated import Machines, machines
+from simulated import RayBackend, machines
 
 from mjxgait.api import load_creature
 from mjxgait.config.schema import Config
@@ -40,7 +40,7 @@ from mjxgait.distributed.connect import connected
 from mjxgait.distributed.jobs import AdvanceRows, Job
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.rows import Blocks
-from mjxgait.distributed.scheduler import Crew
+from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.plugins import resolve_config
 from mjxgait.training.checkpoint import Checkpoints, pack
 from mjxgait.training.experiment import build_experiment
@@ -77,11 +77,11 @@ class Clocked:
 class Clock:
     """Scheduler that measures its jobs; processor: s of processor time in all."""
 
-    def __init__(self, crew: Crew) -> None:
-        self.crew, self.processor = crew, 0.0
+    def __init__(self, scheduler: Scheduler) -> None:
+        self.scheduler, self.processor = scheduler, 0.0
 
     def all(self, work: Iterable[tuple[Recipe, Job]]) -> list[Any]:
-        found = self.crew.all((recipe, Clocked(job)) for recipe, job in work)
+        found = self.scheduler.all((recipe, Clocked(job)) for recipe, job in work)
         self.processor += sum(seconds for _, seconds in found)
         return [result for result, _ in found]
 
@@ -100,11 +100,11 @@ def main() -> None:
     options = parser.parse_args()
     found = json.loads(options.json.read_text()) if options.json.exists() else {}
     prepare_devices(1)
-    with bound(2) as made, connected(made.address, say) as crew:
+    with bound(2) as made, connected(made.address, say) as scheduler:
         for name in options.what:
             load = [round(os.getloadavg()[0], 1)]
-            gather(crew, 2)
-            found[name] = stages[name](crew, options)
+            gather(scheduler, 2)
+            found[name] = stages[name](scheduler, options)
             load.append(round(os.getloadavg()[0], 1))
             found[name] |= {"cores": os.cpu_count(), "load before and after": load}
             print(name, json.dumps(found[name], indent=2, ensure_ascii=False), flush=True)
@@ -124,34 +124,34 @@ def subject(
     return creature, build(type(config), merge(dataclasses.asdict(config), table), "the benchmark")
 
 
-def rows(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
+def rows(scheduler: Scheduler, options: argparse.Namespace) -> dict[str, Any]:
     """Eight runs as jobs of one row each."""
     creature, config = subject(options, 128)
     recipes = [
         Recipe.of(creature, [dataclasses.replace(config, seed=seed)]) for seed in range(RUNS)
     ]
 
-    clock = Clock(crew)
+    clock = Clock(scheduler)
 
     def work(until: int = options.generations) -> None:
         clock.all((recipe, AdvanceRows(None, until)) for recipe in recipes)
 
     for machine in (0, 1):
-        with one_of(crew, machine):
+        with one_of(scheduler, machine):
             work(0)  # each machine builds and compiles everything
     found = in_turns(clock, work, options.laps)
     return found | {"runs": RUNS, "generations": options.generations}
 
 
-def blocks(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
+def blocks(scheduler: Scheduler, options: argparse.Namespace) -> dict[str, Any]:
     """Generations of one population, in eight chunks."""
     creature, config = subject(options, 512)
     experiment = build_experiment(creature, config)
-    clock = Clock(crew)
+    clock = Clock(scheduler)
     step = experiment.compile(Blocks(clock, creature, config))
     begun = experiment.place(experiment.init())
     for machine in (0, 1):
-        with one_of(crew, machine):
+        with one_of(scheduler, machine):
             begun, _ = step(begun)
 
     def work() -> None:
@@ -160,9 +160,9 @@ def blocks(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
             state, _ = step(state)
         jax.block_until_ready(state)
 
-    before, spent = sum(crew.done.values()), clock.processor
+    before, spent = sum(scheduler.done.values()), clock.processor
     found = in_turns(clock, work, options.laps)
-    pieces = sum(crew.done.values()) - before
+    pieces = sum(scheduler.done.values()) - before
     return found | {
         "blocks per generation": 8,
         "generations": options.generations,
@@ -170,22 +170,22 @@ def blocks(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def overhead(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
+def overhead(scheduler: Scheduler, options: argparse.Namespace) -> dict[str, Any]:
     """Wall time that the only machine spends idle, with the shortest episodes."""
     found: dict[str, Any] = {"population": SIZES[-1]}
     for size in SIZES:
         creature, config = subject(options, SIZES[-1], seconds=0.05, block=size)
-        judged = Timed(Blocks(crew, creature, config))
+        judged = Timed(Blocks(scheduler, creature, config))
         experiment = build_experiment(creature, config)
         step = experiment.compile(judged)
         state = experiment.place(experiment.init())
         beside, rest = [], []
-        with one_of(crew, 0):
+        with one_of(scheduler, 0):
             for _ in range(6):
-                began, worked, judged.seconds = time.perf_counter(), work_of(crew), 0.0
+                began, worked, judged.seconds = time.perf_counter(), work_of(scheduler), 0.0
                 state, _ = jax.block_until_ready(step(state))
                 wall = time.perf_counter() - began
-                beside.append(judged.seconds - (work_of(crew) - worked))
+                beside.append(judged.seconds - (work_of(scheduler) - worked))
                 rest.append(wall - judged.seconds)
         found[f"blocks of {size}"] = {
             "ms beside the blocks": round(1000 * median(beside[1:]), 1),
@@ -195,19 +195,19 @@ def overhead(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
     return found
 
 
-def calls(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
+def calls(scheduler: Scheduler, options: argparse.Namespace) -> dict[str, Any]:
     """Costs of jobs that do nothing, hundreds at once, and this process's time for them."""
     recipe, found = Recipe({}, ()), dict[str, Any]()
     for size in (100, 10_000, 1_000_000):
         count = 400
         began, spent = time.perf_counter(), time.process_time()
-        crew.all((recipe, Nothing(bytes(size))) for _ in range(count))
+        scheduler.all((recipe, Nothing(bytes(size))) for _ in range(count))
         found[f"pieces per second, {size} bytes"] = round(count / (time.perf_counter() - began))
         spent = 1000 * (time.process_time() - spent) / count
         found[f"ms of this process per piece, {size} bytes"] = round(spent, 3)
-    with one_of(crew, 0):
+    with one_of(scheduler, 0):
         began = time.perf_counter()
-        crew.all((recipe, Nothing()) for _ in range(200))
+        scheduler.all((recipe, Nothing()) for _ in range(200))
         found["ms there and back"] = round(1000 * (time.perf_counter() - began) / 200, 2)
     creature, config = subject(options, 128)
     state = build_experiment(creature, config).init()
@@ -217,14 +217,16 @@ def calls(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
     )
     found["bytes per verdict"] = (state.terms.nbytes + state.outcome.nbytes) // people
     found["ms to put a row's state on disk"] = storing(creature, state)
-    return found | {"µs per piece under way and look": looking(crew)}  # last: leaves a worker busy
+    return found | {
+        "µs per piece under way and look": looking(scheduler)
+    }  # last: leaves a worker busy
 
 
-def looking(crew: Crew) -> float:
+def looking(scheduler: Scheduler) -> float:
     """us of `ray.wait` per result that is not there yet."""
     import ray  # only after `simulated` has set its environment
 
-    actor, _ = next(iter(crew.hands._actors.values()))
+    actor, _ = next(iter(scheduler.hands._actors.values()))
     recipe = ray.put(Recipe({}, ()))
     refs = [actor.do.remote(recipe, Nothing(seconds=0.02)) for _ in range(1000)]
     began, count = time.perf_counter(), 50
@@ -262,7 +264,7 @@ class Timed:
 
 
 @contextlib.contextmanager
-def bound(count: int) -> Iterator[Machines]:
+def bound(count: int) -> Iterator[RayBackend]:
     """Machines of one core each, the n-th bound to core n; this process is not bound."""
     before = os.sched_getaffinity(0)
     cores = sorted(before)
@@ -279,14 +281,14 @@ def bound(count: int) -> Iterator[Machines]:
 
 
 @contextlib.contextmanager
-def one_of(crew: Crew, machine: int) -> Iterator[None]:
+def one_of(scheduler: Scheduler, machine: int) -> Iterator[None]:
     """Let one of two machines do everything."""
-    gather(crew, 2)
-    crew.idle.sort(key=lambda worker: worker.number)
-    resting = crew.idle.pop(1 - machine)
+    gather(scheduler, 2)
+    scheduler.idle.sort(key=lambda worker: worker.number)
+    resting = scheduler.idle.pop(1 - machine)
     yield
-    crew.idle.append(resting)
-    gather(crew, 2)
+    scheduler.idle.append(resting)
+    gather(scheduler, 2)
 
 
 def in_turns(clock: Clock, work: Callable[[], None], laps: int) -> dict[str, Any]:
@@ -301,7 +303,7 @@ def in_turns(clock: Clock, work: Callable[[], None], laps: int) -> dict[str, Any
         say(f"{machines}: {walls[machines][-1]} s, of processors {spent[machines][-1]} s")
 
     for number in range(laps):
-        with one_of(clock.crew, number % 2):
+        with one_of(clock.scheduler, number % 2):
             lap("one")
         lap("two")
     ratio = {
@@ -316,14 +318,14 @@ def in_turns(clock: Clock, work: Callable[[], None], laps: int) -> dict[str, Any
     }
 
 
-def work_of(crew: Crew) -> float:
+def work_of(scheduler: Scheduler) -> float:
     """Seconds of work of all workers."""
-    return float(sum(crew.hands.seconds.values()))
+    return float(sum(scheduler.hands.seconds.values()))
 
 
-def gather(crew: Crew, count: int) -> None:
+def gather(scheduler: Scheduler, count: int) -> None:
     """Wait until all workers are idle."""
-    crew.next(lambda: len(crew.idle) >= count)
+    scheduler.next(lambda: len(scheduler.idle) >= count)
 
 
 def say(line: str) -> None:

@@ -24,7 +24,7 @@ from simulated import machines
 from mjxgait.cli.ablate import ROWS, STRIDE
 from mjxgait.distributed.connect import connected
 from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.scheduler import Crew, Report, Worker
+from mjxgait.distributed.scheduler import Report, Scheduler, Worker
 
 RUNS, PEOPLE, BLOCK = 10_000, 1_000_000, 64
 MB = 1e6
@@ -65,7 +65,7 @@ class Piece:
 
 
 class Paper:
-    """See `Hands`. Its clock is the scheduler's; this machine's own work advances it."""
+    """See `Backend`. Its clock is the scheduler's; this machine's own work advances it."""
 
     def __init__(self, workers: int, costs: Costs) -> None:
         self.now, self.costs = 0.0, costs
@@ -103,15 +103,15 @@ def on_paper(
     Each job of a chain follows on the one before.
     """
     hands = Paper(workers, costs)
-    crew = Crew(hands, clock=lambda: hands.now)
+    scheduler = Scheduler(hands, clock=lambda: hands.now)
     left = dict.fromkeys(range(count), in_a_row)
     for key in left:
-        crew.submit(key, lambda: (None, piece))
+        scheduler.submit(key, lambda: (None, piece))
     while left:
-        key, _ = crew.next(bool)
+        key, _ = scheduler.next(bool)
         left[key] -= 1
         if left[key]:
-            crew.submit(key, lambda: (None, piece), first=True)
+            scheduler.submit(key, lambda: (None, piece), first=True)
         else:
             del left[key]
     return hands.now, count * in_a_row * piece.seconds / (workers * hands.now)
@@ -165,12 +165,12 @@ def checked(costs: Costs) -> dict[str, Any]:
     workers, count, found = 16, 400, {}
     with machines(1) as made:
         made.add(cores=workers - 1)
-        with connected(made.address, say) as crew:
-            gather(crew, workers)
+        with connected(made.address, say) as scheduler:
+            gather(scheduler, workers)
             recipe = Recipe({}, ())
             for seconds in (0.02, 0.1, 0.3):
                 began = time.perf_counter()
-                crew.all((recipe, Nothing(bytes(1000), seconds)) for _ in range(count))
+                scheduler.all((recipe, Nothing(bytes(1000), seconds)) for _ in range(count))
                 wall = time.perf_counter() - began
                 paper, _ = on_paper(workers, costs, Piece(seconds, 1000), count)
                 found[f"{count} pieces of {seconds} s"] = (

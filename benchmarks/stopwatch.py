@@ -63,7 +63,7 @@ def main() -> None:
     watch.watch(experiment, "compile_stages", "compiling")
     watch.watch(loop, "_generation", "evolution")
     # Validation runs in parallel: it delays evolution only where the loop waits.
-    watch.watch(looks.Looks, "found", "waiting for looks")
+    watch.watch(looks.Validation, "found", "waiting for looks")
     watch.watch(examination.Examiner, "best", "examination at the end")
     watch.watch(checkpoint.Checkpoints, "save", "checkpoints")
     watch.watch(checkpoint.Checkpoints, "close", "checkpoints")

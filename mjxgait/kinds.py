@@ -25,8 +25,8 @@ class ControllerKind:
     name: as in the settings (`use.controller`).
     home: the slice's package.
     controller: the class that moves bodies in the compiled program, a `Controller`.
-    reference: from creature, champion and step (s) to the reference controller in NumPy, a `Twin`.
-    serializer: a `Codec`; None writes the genome's arrays as they are.
+    reference: from creature, champion and step (s) to the reference controller in NumPy, a `ReferenceController`.
+    serializer: a `Serializer`; None writes the genome's arrays as they are.
     report: a `GenomeView`; None shows the arrays as they are.
     grows: whether a genome grows its own body.
     """
@@ -51,7 +51,7 @@ class TaskKind:
     name: as in the settings (`use.task`).
     home: the slice's package.
     task: the class that is traced into the compiled program, a `Task`.
-    criteria: the acceptance criteria, a `Demands`.
+    criteria: the acceptance criteria, a `AcceptanceCriteria`.
     modular: whether it is only for bodies that grow.
     water: whether these bodies are in water.
     called: the user's name for the task; one name may mean one task for a body from a model and

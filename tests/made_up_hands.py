@@ -8,7 +8,7 @@ from viewing.made_up import metrics_line
 
 from mjxgait.distributed.jobs import Advanced, AdvanceRows
 from mjxgait.distributed.recipe import Programs, Recipe
-from mjxgait.distributed.scheduler import Crew, Report, Worker
+from mjxgait.distributed.scheduler import Report, Scheduler, Worker
 from mjxgait.experiments.repertoire.grid import POSES
 from mjxgait.training.checkpoint import pack
 
@@ -49,7 +49,7 @@ def pretended(recipe: Recipe, job: AdvanceRows) -> Advanced:
     return Advanced(before.with_arrays(new), lines, "", 1.0, 1)
 
 
-class Interrupted(Crew):
+class Interrupted(Scheduler):
     """One that is told to stop after so many pieces of work."""
 
     left = 3

@@ -30,7 +30,7 @@ from mjxgait.evolution.state import EvolutionState
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.training import examination, loop
 from mjxgait.training.examination import Examiner, Exams, due
-from mjxgait.training.examination import Looks as RunLooks
+from mjxgait.training.examination import Validation as RunLooks
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import (
     CERTIFICATE,
@@ -85,7 +85,7 @@ def state_with(
     )
 
 
-class Looks:
+class Validation:
     """What the examiner will say, the last of a list over and over, and what it was asked."""
 
     def __init__(self) -> None:
@@ -100,16 +100,16 @@ class Looks:
 
 
 @pytest.fixture
-def looks(monkeypatch: pytest.MonkeyPatch) -> Looks:
-    said = Looks()
+def looks(monkeypatch: pytest.MonkeyPatch) -> Validation:
+    said = Validation()
 
-    def glance(*_: object) -> SimpleNamespace:
+    def nominal_check(*_: object) -> SimpleNamespace:
         return SimpleNamespace(margin=said.answer("glance", said.glances))
 
     def certify(*_: object, attempts: int, **__: object) -> Certificate:
         return certificate(said.answer("exam", said.certificates), attempts)
 
-    monkeypatch.setattr(examination, "glance", glance)
+    monkeypatch.setattr(examination, "glance", nominal_check)
 
     def rehearse(*_: object, wanted: float, caution: float) -> float:
         said.wanted.append(wanted)
@@ -134,7 +134,7 @@ def test_it_looks_every_few_generations_and_not_at_the_first():
 
 
 def test_the_draw_to_choose_on_counts_with_the_caution_of_the_settings(
-    experiment: Experiment, looks: Looks, exams: Exams
+    experiment: Experiment, looks: Validation, exams: Exams
 ):
     examiner(experiment, exams, caution=1.5).best(ranked(experiment))
     assert set(looks.cautions) == {1.5}
@@ -173,9 +173,9 @@ def test_a_promising_best_with_room_is_examined_and_ends_the_run(experiment, loo
     ],
 )
 def test_else_it_goes_on_and_spares_what_it_can(
-    experiment, looks, exams, generation, speed, alive, glance, rehearsal, asked
+    experiment, looks, exams, generation, speed, alive, nominal_check, rehearsal, asked
 ):
-    looks.glances, looks.rehearsals = [glance], [rehearsal]
+    looks.glances, looks.rehearsals = [nominal_check], [rehearsal]
     state = state_with(experiment, generation, speed, alive)
     assert examiner(experiment, exams).early(state) is None
     assert len(looks.asked) == asked
@@ -407,7 +407,7 @@ def test_in_the_end_one_that_has_failed_before_is_not_chosen(experiment, looks, 
 
 
 @pytest.fixture
-def promising(monkeypatch: pytest.MonkeyPatch, looks: Looks) -> None:
+def promising(monkeypatch: pytest.MonkeyPatch, looks: Validation) -> None:
     """Everybody is promising, so that the small run is looked at."""
     monkeypatch.setattr(examination, "_promising", lambda *_: True)
 
@@ -451,13 +451,13 @@ def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
     tmp_path: Path,
     experiment: Experiment,
     promising: None,
-    looks: Looks,
+    looks: Validation,
     monkeypatch: pytest.MonkeyPatch,
 ):
     """Whatever the machine does first, the folder is the one of a run that waited."""
     waited, beside = tmp_path / "waited", tmp_path / "beside"
     seen: list[int] = []
-    soon = examination.glance
+    soon = examination.nominal_check
 
     def late(*arguments: object) -> SimpleNamespace:
         until = time.monotonic() + 60
@@ -518,7 +518,7 @@ def test_what_goes_wrong_in_a_look_ends_the_run_as_it_would_have(
 
 
 def test_one_that_never_passes_goes_on_to_the_end(
-    tmp_path: Path, experiment: Experiment, promising: None, looks: Looks
+    tmp_path: Path, experiment: Experiment, promising: None, looks: Validation
 ):
     looks.certificates = [-0.5]
     folder = tmp_path / "run"

@@ -26,7 +26,7 @@ from mjxgait.controllers.key_poses.controller import (
     interpolate,
     pose_cycle,
 )
-from mjxgait.controllers.key_poses.reference import PoseTwin
+from mjxgait.controllers.key_poses.reference import PoseReference
 from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature
 from mjxgait.types import Sensed
@@ -170,7 +170,7 @@ def test_the_clock_is_the_examiners_on_every_step(
 
     _, found = jax.lax.scan(moved, control.init(), length=1600)
     named = dict(zip(TUNING, map(float, genes), strict=True))
-    examiner = PoseTwin(stool, pose_champion(stool, poses, named, rules), 0.005)
+    examiner = PoseReference(stool, pose_champion(stool, poses, named, rules), 0.005)
     place, far = np.zeros(1601, int), np.ones((1601, 4))
     expected = examiner.advance(place, far, 0 * far, np.arange(1601))
     assert np.array_equal(found, expected[1:])
@@ -254,7 +254,7 @@ def test_who_is_to_turn_steers_more_as_the_examiner_has_it(stool: Creature):
         cycle = control.prepare(Genome(jnp.asarray(poses), genes), rules)
         target, _ = control.act(cycle, control.init(), felt)
         named = dict(zip(TUNING, map(float, genes), strict=True))
-        twin = PoseTwin(creature, pose_champion(creature, poses, named, rules), 0.005)
+        twin = PoseReference(creature, pose_champion(creature, poses, named, rules), 0.005)
         of_one = {name: np.asarray(value)[None] for name, value in felt.items()}
         np.testing.assert_allclose(
             target, twin.target(np.zeros(1, int), of_one, np.zeros(1, int))[0], atol=1e-5

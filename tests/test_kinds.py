@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import mjxgait.tasks
-from mjxgait.certification.acceptance import demands_of
+from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.errors import UserError
 from mjxgait.kinds import controllers, in_water, meant_of_grown, task_kind, tasks
 from mjxgait.plugins.registry import find
@@ -29,9 +29,9 @@ def test_a_controller_has_all_of_its_parts(kind):
 @pytest.mark.parametrize("kind", tasks().values(), ids=lambda kind: kind.name)
 def test_a_task_has_all_of_its_parts(kind):
     assert isinstance(kind.part("task"), type)
-    demands = demands_of(kind.name)
-    assert demands.grown == kind.modular
-    assert (demands.drag > 0) == kind.water == in_water(kind.name)
+    acceptance = acceptance_of(kind.name)
+    assert acceptance.grown == kind.modular
+    assert (acceptance.drag > 0) == kind.water == in_water(kind.name)
 
 
 def test_a_name_may_mean_another_task_to_a_body_that_grows():

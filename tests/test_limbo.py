@@ -12,7 +12,7 @@ import pytest
 from helpers import SHORT, STOOL, pose_champion, said_by
 
 from mjxgait.certification import CertificateConfig, record
-from mjxgait.certification.acceptance import demands_of, promising
+from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.config.layers import find_creature
@@ -42,7 +42,7 @@ from mjxgait.training.generation import (
 )
 from mjxgait.types import Sensed
 
-CONFIG, DEMANDS = CertificateConfig(), demands_of("limbo")
+CONFIG, DEMANDS = CertificateConfig(), acceptance_of("limbo")
 STEP, HORIZON, HEIGHT = 0.005, 1000, 0.35
 
 
@@ -286,10 +286,13 @@ def test_a_lower_bar_is_a_setting_of_the_same_program(stool: Creature):
 
 
 def test_evolution_and_examiner_mean_the_same_bar_and_the_same_goals():
-    demands = Demanded()
-    assert (demands.place, EXAMINED_RADIUS) == (BAR_PLACE, evolution.BAR_RADIUS)
-    assert demands.height == LimboConfig().height == HEIGHT
-    assert (demands.goals, demands.nominal) == (evolution.LIMBO_GOALS, evolution.LIMBO_NOMINAL_GOAL)
+    acceptance = Demanded()
+    assert (acceptance.place, EXAMINED_RADIUS) == (BAR_PLACE, evolution.BAR_RADIUS)
+    assert acceptance.height == LimboConfig().height == HEIGHT
+    assert (acceptance.goals, acceptance.nominal) == (
+        evolution.LIMBO_GOALS,
+        evolution.LIMBO_NOMINAL_GOAL,
+    )
 
 
 def test_the_clearance_is_the_distance_of_the_nearest_part(luxo: Creature, looker: Clearance):

@@ -21,15 +21,15 @@ from mjxgait.controllers.key_poses.config import (
     gene_names,
 )
 from mjxgait.controllers.key_poses.controller import Genome, PoseTracker, stepping
-from mjxgait.controllers.key_poses.reference import PoseTwin
+from mjxgait.controllers.key_poses.reference import PoseReference
 from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.plugins import resolve_config
-from mjxgait.reference.changing import ChangingTwin, HaltingTwin
-from mjxgait.reference.controllers import Twin
+from mjxgait.reference.changing import ChangingReference, HaltingReference
+from mjxgait.reference.controllers import ReferenceController
 from mjxgait.reference.layout import start_frame
 from mjxgait.reference.state import State
 from mjxgait.reference.state import sense as examiner_sense
@@ -255,7 +255,7 @@ def test_the_examiner_steps_as_evolution_does(biped):
     )
     values = dict.fromkeys(TUNING, 0.0) | {"threshold": 0.1, "period": 0.8} | genes
     champion = pose_champion(creature, np.stack([biped.joints.stand] * 2), values)
-    twin = PoseTwin(creature, champion, STEP)
+    twin = PoseReference(creature, champion, STEP)
     assert set(twin.reads) == set(reads)
     for _ in range(6):
         turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -286,7 +286,7 @@ def test_the_cycle_grows_out_of_the_standing_pose(biped: Creature, begin: float)
     champion = pose_champion(
         biped, np.stack([pose] * 2), {"begin": begin}, PoseConfig(mirror=False)
     )
-    control, twin = PoseTracker(biped, STEP), PoseTwin(biped, champion, STEP)
+    control, twin = PoseTracker(biped, STEP), PoseReference(biped, champion, STEP)
     genome = Genome(*(jnp.asarray(champion.genome[name]) for name in ("key_poses", "tuning")))
     cycle = control.prepare(genome, champion.settings)
     moment = seen(biped)
@@ -306,11 +306,11 @@ def test_the_cycle_grows_out_of_the_standing_pose(biped: Creature, begin: float)
 def test_who_is_told_something_later_begins_as_it_always_does(biped: Creature, told: str):
     pose = np.clip(biped.joints.stand + 0.2, biped.joints.low, biped.joints.high)
     champion = pose_champion(biped, np.stack([pose] * 2), {"begin": 0.5}, PoseConfig(mirror=False))
-    usual, later, once = PoseTwin(biped, champion, STEP), np.array([9.0]), np.ones(1)
+    usual, later, once = PoseReference(biped, champion, STEP), np.array([9.0]), np.ones(1)
     if told == "to stop":
-        other: Twin = HaltingTwin(biped, champion, STEP, later, once)
+        other: ReferenceController = HaltingReference(biped, champion, STEP, later, once)
     else:
-        other = ChangingTwin(biped, champion, champion, STEP, later, 1.0)
+        other = ChangingReference(biped, champion, champion, STEP, later, 1.0)
     felt = examiner_sense(biped, as_examined(biped, seen(biped)), usual.reads)
     known, memory = usual.init(1), other.init(1)
     for _ in range(150):

@@ -11,7 +11,7 @@ from certify_made_up import walk
 from test_hop import HORIZON, REACH, STEP, moment, reaching
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.acceptance import demands_of, promising
+from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.trials import simulate
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording
@@ -27,7 +27,7 @@ from mjxgait.tasks.hop.config import (
 from mjxgait.tasks.hop.task import Aim, Travel
 from mjxgait.tasks.hop.thresholds import TravelConfig as Demanded
 
-CONFIG, DEMANDS = CertificateConfig(), demands_of("travel")
+CONFIG, DEMANDS = CertificateConfig(), acceptance_of("travel")
 
 
 def task(creature: Creature) -> Travel:
@@ -66,7 +66,7 @@ def test_evolution_and_examiner_move_goals_alike(stool: Creature):
 def test_the_goal_of_other_tasks_stays(stool: Creature):
     goal, way = np.array([1.0, 0.4]), np.array([1.0, 3.0])
     for name in ("walk", "hop", "limbo"):
-        assert demands_of(name).onward(goal, goal, way) is goal
+        assert acceptance_of(name).onward(goal, goal, way) is goal
 
 
 def test_what_counts_is_the_way_and_what_is_told_are_the_goals(stool: Creature):
@@ -109,8 +109,8 @@ def test_a_controller_is_told_the_same_moving_goals(
 
 
 def test_the_examiner_and_evolution_mean_the_same_goals():
-    demands = Demanded()
-    assert (demands.goals, demands.nominal, travel.NEAR) == (GOALS, NOMINAL_GOAL, NEAR)
+    acceptance = Demanded()
+    assert (acceptance.goals, acceptance.nominal, travel.NEAR) == (GOALS, NOMINAL_GOAL, NEAR)
 
 
 def way(*places: tuple[float, float]) -> np.ndarray:

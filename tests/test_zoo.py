@@ -18,7 +18,7 @@ from viewing.made_up import treading
 from mjxgait.champion import write_champion
 from mjxgait.creature import Creature
 from mjxgait.distributed.rows import Rows
-from mjxgait.distributed.scheduler import Crew
+from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.experiments.multi_seed import create_zoo, folders_of, found_in, read_seeds
 from mjxgait.experiments.repertoire.grid import POSES
 from mjxgait.training.folder import (
@@ -40,11 +40,11 @@ def begun(zoo: Path, creature: Creature, together: int = 0) -> Path:
     return create_zoo(zoo, creature, config, len(SEEDS), together)
 
 
-def go_on(zoo: Path, creature: Creature, kind: type[Crew] = Crew) -> bool:
+def go_on(zoo: Path, creature: Creature, kind: type[Scheduler] = Scheduler) -> bool:
     seeds = read_seeds(zoo)
     rows = Rows(creature, seeds.folders(zoo), keep_every=1, together=seeds.together)
-    crew = kind(Pretend())
-    return rows.to_the_end(None, crew, lambda *told: None, lambda: False) is not None
+    scheduler = kind(Pretend())
+    return rows.to_the_end(None, scheduler, lambda *told: None, lambda: False) is not None
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.starts import Starts
 
 
-class Demands(Protocol):
+class AcceptanceCriteria(Protocol):
     """Acceptance criteria of one task; `StaysUp` implements the part on disturbed simulations."""
 
     verdict: str
@@ -38,7 +38,7 @@ class Demands(Protocol):
     worth: float
     """Least share of successful trials in evolution for an individual to be worth validating."""
 
-    def asked(self, wish: Mapping[str, Any]) -> "Demands":
+    def asked(self, wish: Mapping[str, Any]) -> "AcceptanceCriteria":
         """Return the criteria with those of the requested targets, by name."""
         ...
 
@@ -123,49 +123,52 @@ class Demands(Protocol):
 
 
 def promising(
-    demands: Demands, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    acceptance: AcceptanceCriteria,
+    outcome: Mapping[str, np.ndarray],
+    seconds: float,
+    creature: Creature,
 ) -> bool:
-    """Return True if an individual is worth validating; see `Demands.managed`."""
-    return bool(demands.managed(outcome, seconds, creature).mean() >= demands.worth)
+    """Return True if an individual is worth validating; see `AcceptanceCriteria.managed`."""
+    return bool(acceptance.managed(outcome, seconds, creature).mean() >= acceptance.worth)
 
 
 class Unasked:
-    """See `Demands`: for a task without targets.
+    """See `AcceptanceCriteria`: for a task without targets.
 
-    revision: see `Demands`.
+    revision: see `AcceptanceCriteria`.
     """
 
     revision: int = 0
 
     def asked(self, wish: Mapping[str, Any]) -> Any:
-        """See `Demands`: the same."""
+        """See `AcceptanceCriteria`: the same."""
         return self
 
     def told(self, steps: int, time_step: float) -> np.ndarray | None:
-        """See `Demands`: straight ahead."""
+        """See `AcceptanceCriteria`: straight ahead."""
         return None
 
     def commands(
         self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
     ) -> np.ndarray | None:
-        """See `Demands`: none."""
+        """See `AcceptanceCriteria`: none."""
         return None
 
     def obeyed(
         self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: nothing was commanded."""
+        """See `AcceptanceCriteria`: nothing was commanded."""
         return ()
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `Demands`: those that are down."""
+        """See `AcceptanceCriteria`: those that are down."""
         return ~outcome.stayed_up
 
 
 class StaysUp(Unasked):
-    """See `Demands`: criteria 4 and 5 for tasks with no goal but to be up at the end.
+    """See `AcceptanceCriteria`: criteria 4 and 5 for tasks with no goal but to be up at the end.
 
-    drag, pushed, by_pushes, grown, leaps, worth: see `Demands`.
+    drag, pushed, by_pushes, grown, leaps, worth: see `AcceptanceCriteria`.
     """
 
     drag: float = 0.0
@@ -176,33 +179,33 @@ class StaysUp(Unasked):
     worth: float = 1.0
 
     def fall(self, config: CertificateConfig) -> Fall:
-        """See `Demands`: as criterion 1 has it."""
+        """See `AcceptanceCriteria`: as criterion 1 has it."""
         return config.upright
 
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `Demands`: as they are."""
+        """See `AcceptanceCriteria`: as they are."""
         return starts
 
     def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """See `Demands`: the same."""
+        """See `AcceptanceCriteria`: the same."""
         return goal
 
     def kept(
         self, champion: Champion, whole: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: evolution has promised nothing."""
+        """See `AcceptanceCriteria`: evolution has promised nothing."""
         return ()
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that have stayed up."""
+        """See `AcceptanceCriteria`: those that have stayed up."""
         return outcome.stayed_up
 
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 4 and 5."""
+        """See `AcceptanceCriteria`: 4 and 5."""
         return criteria.starts(started, config), criteria.pushes(pushed, config)
 
 
@@ -222,8 +225,8 @@ class HasCriteria(Protocol):
         ...
 
 
-class PlainDemands(StaysUp):
-    """See `Demands`."""
+class PlainCriteria(StaysUp):
+    """See `AcceptanceCriteria`."""
 
     verdict = "it does what its task demands"
 
@@ -233,7 +236,7 @@ class PlainDemands(StaysUp):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: stays up, at half the time step too; physics, parts, and its own."""
+        """See `AcceptanceCriteria`: stays up, at half the time step too; physics, parts, and its own."""
         window = whole.window(config.warmup)
         repeated = self._basic(halved, config)
         failed = sum(not m.passed for c in repeated for m in c.measures)
@@ -249,7 +252,7 @@ class PlainDemands(StaysUp):
         )
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`."""
+        """See `AcceptanceCriteria`."""
         window = whole.window(config.warmup)
         v = speed(window)
         return {"speed": v, "overlap": worst_overlap(window), "summary": f"{v:.2f} m/s"}
@@ -257,7 +260,7 @@ class PlainDemands(StaysUp):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: to the end."""
+        """See `AcceptanceCriteria`: to the end."""
         return to_the_end(outcome, seconds, creature)
 
     def _basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
@@ -265,7 +268,7 @@ class PlainDemands(StaysUp):
         return (upright(whole, window, config.upright), *self.task.criteria(window))
 
 
-def demands_of(task: str, wish: Mapping[str, Any] | None = None) -> Demands:
+def acceptance_of(task: str, wish: Mapping[str, Any] | None = None) -> AcceptanceCriteria:
     """Return the criteria of a task, with those of the requested targets.
 
     Raises:
@@ -274,13 +277,13 @@ def demands_of(task: str, wish: Mapping[str, Any] | None = None) -> Demands:
     return _made(task_kind(task)).asked(wish or {})
 
 
-def how_simulated(task: str, wish: Mapping[str, Any] | None = None) -> Demands | StaysUp:
+def how_simulated(task: str, wish: Mapping[str, Any] | None = None) -> AcceptanceCriteria | StaysUp:
     """Return a task's goals, falls and turns for a simulation; the usual ones if it is unknown."""
     kind = known_task(task)
     return (_made(kind) if kind else StaysUp()).asked(wish or {})
 
 
 @functools.cache
-def _made(kind: TaskKind) -> Demands:
-    made: Demands = kind.part("criteria")()
+def _made(kind: TaskKind) -> AcceptanceCriteria:
+    made: AcceptanceCriteria = kind.part("criteria")()
     return made

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mjxgait.certification import criteria, trials
-from mjxgait.certification.acceptance import demands_of, how_simulated
+from mjxgait.certification.acceptance import acceptance_of, how_simulated
 from mjxgait.certification.check_body import check_body
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
@@ -113,7 +113,7 @@ class Certificate:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Glance:
+class NominalCheck:
     """Nominal check: the undisturbed walk, and the criteria that it alone decides, all but 4, 5."""
 
     whole: Recording
@@ -125,11 +125,11 @@ class Glance:
         return judge(self.criteria).margin
 
 
-def glance(
+def nominal_check(
     creature: Creature,
     champion: Champion,
     config: CertificateConfig | None = None,
-) -> Glance:
+) -> NominalCheck:
     """Check the undisturbed walk, which takes a fifth of the examination's time.
 
     The walk with half the time step runs beside the other: most of the cost of one walk is Python
@@ -140,12 +140,12 @@ def glance(
     """
     config = config or CertificateConfig()
     check_body(creature, champion.pose_span)
-    demands = demands_of(champion.task, champion.wish)
-    start = demands.aimed(nominal_starts(creature, 1), config)
+    acceptance = acceptance_of(champion.task, champion.wish)
+    start = acceptance.aimed(nominal_starts(creature, 1), config)
     both = dataclasses.replace(join(start, start), refine=np.array([1, 2]))
     whole, halved = recordings(creature, champion, config.seconds, both)
-    found = demands.undisturbed(whole, halved, config)
-    return Glance(whole, (*found, *demands.kept(champion, whole, config)))
+    found = acceptance.undisturbed(whole, halved, config)
+    return NominalCheck(whole, (*found, *acceptance.kept(champion, whole, config)))
 
 
 def certify(
@@ -153,13 +153,13 @@ def certify(
     champion: Champion,
     config: CertificateConfig | None = None,
     threads: int = 0,
-    seen: Glance | None = None,
+    seen: NominalCheck | None = None,
     attempts: int = 1,
 ) -> Certificate:
     """Examine a champion by all nine criteria, on starts and pushes drawn for it alone.
 
     Args:
-      seen: result of `glance` with the same config, to save the repetition.
+      seen: result of `nominal_check` with the same config, to save the repetition.
       attempts: examinations of its run, this one included.
 
     Raises:
@@ -167,27 +167,27 @@ def certify(
     """
     config = config or CertificateConfig()
     began = time.perf_counter()
-    seen = seen or glance(creature, champion, config)
-    draw, demands = trials.own(champion, config), demands_of(champion.task, champion.wish)
+    seen = seen or nominal_check(creature, champion, config)
+    draw, acceptance = trials.own(champion, config), acceptance_of(champion.task, champion.wish)
     disturbed = trials.starts(creature, config, draw, config.starts.count)
     groups = [
         nominal_starts(creature, 1),
-        demands.aimed(disturbed, config, draw.generator(AIMS)),
+        acceptance.aimed(disturbed, config, draw.generator(AIMS)),
     ]
-    if demands.pushed:
+    if acceptance.pushed:
         groups += [trials.pushes(creature, config, draw, config.pushes.count)]
         groups += trials.ladder(creature, config, draw)
-    starts = demands.aimed(join(*groups), config)
+    starts = acceptance.aimed(join(*groups), config)
     outcome = simulate(
-        creature, champion, starts, config.seconds, fall=demands.fall(config), threads=threads
+        creature, champion, starts, config.seconds, fall=acceptance.fall(config), threads=threads
     )
     ends = np.cumsum([len(g) for g in groups])[:-1]
     plain, _, *pushed = (float(up.mean()) for up in np.split(outcome.stayed_up, ends))
-    started = float(np.split(demands.succeeded(outcome, starts, config), ends)[1].mean())
-    found = demands.disturbed(started, pushed[0] if pushed else np.nan, config)
+    started = float(np.split(acceptance.succeeded(outcome, starts, config), ends)[1].mean())
+    found = acceptance.disturbed(started, pushed[0] if pushed else np.nan, config)
     found += told_to_turn(creature, champion, config, draw, threads)
     judged = sorted((*seen.criteria, *found), key=lambda c: c.number)
-    report = demands.report(seen.whole, config) | {"ground": str(creature.terrain)}
+    report = acceptance.report(seen.whole, config) | {"ground": str(creature.terrain)}
     if pushed:
         sizes = (0.0, config.pushes.speed, *config.pushes.ladder)
         report |= _bears(dict(zip(sizes, (plain, *pushed), strict=True)))
@@ -259,8 +259,8 @@ def push_ladder(
     Push speeds are in units of sqrt(g * hip height).
     """
     groups = trials.ladder(creature, config, trials.common(config))
-    starts = demands_of(champion.task, champion.wish).aimed(join(*groups), config)
-    fall = demands_of(champion.task, champion.wish).fall(config)
+    starts = acceptance_of(champion.task, champion.wish).aimed(join(*groups), config)
+    fall = acceptance_of(champion.task, champion.wish).fall(config)
     outcome = simulate(creature, champion, starts, config.seconds, fall=fall, threads=threads)
     return dict(
         zip(

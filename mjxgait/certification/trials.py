@@ -14,14 +14,14 @@ from functools import partial
 
 import numpy as np
 
-from mjxgait.certification.acceptance import demands_of, how_simulated
+from mjxgait.certification.acceptance import acceptance_of, how_simulated
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
 from mjxgait.certification.verdict import judge
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.processes import cores
-from mjxgait.reference.controllers import Twin
+from mjxgait.reference.controllers import ReferenceController
 from mjxgait.reference.outcome import Fall, Outcome, Trajectory, Watch
 from mjxgait.reference.starts import Starts, join, perturbed_starts, pushed_starts, unfamiliar
 from mjxgait.reference.stepping import Stepping
@@ -112,7 +112,7 @@ def simulate(
     fall: Fall | None = None,
     threads: int = 0,
     watch: Watch | None = None,
-    twin: Twin | None = None,
+    twin: ReferenceController | None = None,
 ) -> Outcome:
     """Simulate the champion from every start; a start without a goal gets the task's nominal one.
 
@@ -170,17 +170,17 @@ def told_to_turn(
     creature: Creature, champion: Champion, config: CertificateConfig, draw: Draw, threads: int
 ) -> tuple[Criterion, ...]:
     """Evaluate steering by drawn headings from perturbed starts; empty if none are commanded."""
-    demands, step = demands_of(champion.task, champion.wish), creature.model.opt.timestep
+    acceptance, step = acceptance_of(champion.task, champion.wish), creature.model.opt.timestep
     steps = round(STEERED_FOR / step)
-    told = demands.commands(config, steps, step, draw.generator(COMMANDS))
+    told = acceptance.commands(config, steps, step, draw.generator(COMMANDS))
     if told is None:
         return ()
     begun = starts(creature, config, draw, len(told))
-    fall = demands.fall(config)
+    fall = acceptance.fall(config)
     outcome = simulate(
         creature, champion, begun, STEERED_FOR, heading=told, fall=fall, threads=threads
     )
-    return demands.obeyed(outcome, told, config)
+    return acceptance.obeyed(outcome, told, config)
 
 
 def rehearse(
@@ -206,25 +206,27 @@ def rehearse(
         a share has been lucky more often than not.
     """
     config = config or CertificateConfig()
-    draw, demands = common(config), demands_of(champion.task, champion.wish)
-    disturbed = demands.aimed(starts(creature, config, draw, count), config, draw.generator(AIMS))
+    draw, acceptance = common(config), acceptance_of(champion.task, champion.wish)
+    disturbed = acceptance.aimed(
+        starts(creature, config, draw, count), config, draw.generator(AIMS)
+    )
     extra: tuple[Starts, ...] = ()
     seconds = config.seconds
-    if demands.by_pushes:
+    if acceptance.by_pushes:
         extra = (pushes(creature, config, draw, count),)
         seconds = min(seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
-    begun = demands.aimed(join(disturbed, *extra), config)
+    begun = acceptance.aimed(join(disturbed, *extra), config)
 
     def margin(well: np.ndarray) -> float:
         pushed = _cautious(well[count:], caution) if extra else np.nan
-        return _worst(demands.disturbed(_cautious(well[:count], caution), pushed, config))
+        return _worst(acceptance.disturbed(_cautious(well[:count], caution), pushed, config))
 
     watch = Watch(len(begun), lambda lost: margin(~lost) < wanted)
-    fall = demands.fall(config)
+    fall = acceptance.fall(config)
     outcome = simulate(creature, champion, begun, seconds, fall=fall, threads=threads, watch=watch)
     if watch.over:
         return margin(~watch.lost)
-    succeeded = demands.succeeded(outcome, begun, config)
+    succeeded = acceptance.succeeded(outcome, begun, config)
     reached = margin(np.where(np.arange(len(begun)) < count, succeeded, outcome.stayed_up))
     if reached < wanted:
         return reached

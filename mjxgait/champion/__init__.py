@@ -7,14 +7,14 @@ from mjxgait.champion.record import (
     split_genome,
     write_champion,
 )
-from mjxgait.champion.serializers import Codec, codec_of
+from mjxgait.champion.serializers import Serializer, serializer_of
 
 __all__ = [
     "Champion",
-    "Codec",
     "DamagedChampion",
-    "codec_of",
+    "Serializer",
     "read_champion",
+    "serializer_of",
     "split_genome",
     "write_champion",
 ]

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import pydantic
 
-from mjxgait.champion.serializers import Genome, codec_of
+from mjxgait.champion.serializers import Genome, serializer_of
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import (
     STORED,
@@ -69,7 +69,7 @@ class Champion:
             creature=creature.name,
             digest=creature.digest,
             controller=config.use.controller,
-            genome=codec_of(config.use.controller).settled(genome, creature),
+            genome=serializer_of(config.use.controller).settled(genome, creature),
             settings=config.controller,
             drive=config.drive,
             task=config.use.task,
@@ -85,9 +85,9 @@ class Champion:
         Raises:
           UserError: its sizes are those of another creature.
         """
-        codec = codec_of(self.controller)
+        serializer = serializer_of(self.controller)
         try:
-            body = codec.embodied(self.genome, self.settings, self.task, creature)
+            body = serializer.embodied(self.genome, self.settings, self.task, creature)
         except (LookupError, TypeError, ValueError, ArithmeticError) as error:
             raise UserError(
                 f"the champion's genome is damaged: no body grows from it ({error}); take one of "
@@ -127,7 +127,7 @@ class Champion:
         Raises:
           UserError: names the first.
         """
-        codec_of(self.controller).check(self.genome, creature)
+        serializer_of(self.controller).check(self.genome, creature)
 
 
 def split_genome(genome: Genome) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
@@ -153,14 +153,14 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
         creature.gains.torque_limit,
         strict=True,
     )
-    codec = codec_of(champion.controller)
+    serializer = serializer_of(champion.controller)
     document = {
         "schema": SCHEMA,
         "creature": champion.creature,
         "creature_digest": champion.digest,
         "task": champion.task,
         "controller": champion.controller,
-        "genome": codec.document(champion.genome, champion.settings, creature),
+        "genome": serializer.document(champion.genome, champion.settings, creature),
         "settings": as_table(champion.settings),
         "drive": as_table(champion.drive),
         "gains": {
@@ -264,13 +264,13 @@ def _champion(document: Mapping[str, Any], creature: Creature, path: Path) -> Ch
             f"{path}: evolved on another body than {creature.name} as it is now; use the run's "
             "own creature folder"
         )
-    codec = codec_of(document["controller"])
+    serializer = serializer_of(document["controller"])
     return Champion(
         creature=document["creature"],
         digest=document["creature_digest"],
         controller=document["controller"],
-        genome=codec.genome(document["genome"], creature),
-        settings=codec.settings(document["settings"], f"{path}: settings"),
+        genome=serializer.genome(document["genome"], creature),
+        settings=serializer.settings(document["settings"], f"{path}: settings"),
         drive=build(DriveConfig, document["drive"], f"{path}: drive"),
         task=document["task"],
         fitness=document["fitness"],

@@ -18,7 +18,7 @@ from mjxgait.kinds import ControllerKind, known_controller
 Genome = Mapping[str, np.ndarray]
 
 
-class Codec(Protocol):
+class Serializer(Protocol):
     """Serializer between the arrays of a kind of genome and their form in `champion.json`."""
 
     def settled(self, genome: Genome, creature: Creature) -> dict[str, np.ndarray]:
@@ -58,8 +58,8 @@ class Codec(Protocol):
         ...
 
 
-class PlainCodec(Codec):
-    """See `Codec`: arrays as nested lists under their names. Other serializers inherit from it."""
+class PlainSerializer(Serializer):
+    """See `Serializer`: arrays as nested lists under their names. Other serializers inherit from it."""
 
     @override
     def settled(self, genome: Genome, creature: Creature) -> dict[str, np.ndarray]:
@@ -74,7 +74,7 @@ class PlainCodec(Codec):
         return {name: np.array(values, float) for name, values in document.items()}
 
     def settings(self, table: Mapping[str, Any], where: str) -> Any:
-        """See `Codec`: the table unparsed; it is parsed where the controller is available."""
+        """See `Serializer`: the table unparsed; it is parsed where the controller is available."""
         return dict(table)
 
     @override
@@ -95,13 +95,13 @@ class PlainCodec(Codec):
         return creature
 
 
-def codec_of(controller: str) -> Codec:
+def serializer_of(controller: str) -> Serializer:
     """Return the serializer of a kind of controller; the default one if it has none."""
     kind = known_controller(controller)
-    return _made(kind) if kind and kind.serializer else PlainCodec()
+    return _made(kind) if kind and kind.serializer else PlainSerializer()
 
 
 @functools.cache
-def _made(kind: ControllerKind) -> Codec:
-    made: Codec = kind.part("serializer")()
+def _made(kind: ControllerKind) -> Serializer:
+    made: Serializer = kind.part("serializer")()
     return made

@@ -151,15 +151,15 @@ def _run(
 
     begin: makes the folder of a new study; called after the last check.
     """
-    from mjxgait.distributed.evolve import crew_at
+    from mjxgait.distributed.evolve import scheduler_at
     from mjxgait.experiments.ablation.rows import run_study
 
     tell, stride = (screen.part, STRIDE) if cluster else (screen.generation, 1)
-    with crew_at(cluster) as crew:
+    with scheduler_at(cluster) as scheduler:
         if begin is not None:
             begin()
         with locked(folder):
-            return run_study(folder, creature, plan, tell, crew, stride)
+            return run_study(folder, creature, plan, tell, scheduler, stride)
 
 
 class _Progress:

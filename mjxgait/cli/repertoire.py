@@ -86,7 +86,7 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     plan = None if options.resume else planned(options)
     folder, grid = _resumed(options) if plan is None else (plan.folder, plan.grid)
     # JAX takes a second to import, so the options are checked first.
-    from mjxgait.distributed.evolve import crew_at
+    from mjxgait.distributed.evolve import scheduler_at
     from mjxgait.experiments.repertoire.grid import evolve
     from mjxgait.training.ended import examine
     from mjxgait.training.loop import interruptible
@@ -95,12 +95,12 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     prepare_devices(1 if options.cluster else None)
     console, began = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
     screen = _Screen(console)
-    with interruptible() as interrupted, crew_at(options.cluster, console) as crew:
+    with interruptible() as interrupted, scheduler_at(options.cluster, console) as scheduler:
         if plan is not None:
             begin(plan)
         with locked(folder):
             creature, told = open_run(folder / grid.cells[0].name)[0], interrupted.is_set
-            ended = evolve(folder, creature, grid, crew, screen.evolved, told)
+            ended = evolve(folder, creature, grid, scheduler, screen.evolved, told)
             walks = [folder / cell.name for cell in grid.cells]
             again = f"mjxgait repertoire --resume {folder}"
             ended = ended and examine(folder, walks, again, screen.examined, told)

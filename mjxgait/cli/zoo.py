@@ -24,7 +24,7 @@ def evolve_zoo(
     cluster: address of the cluster to use instead of this machine. begin: makes the folder of new
     runs; called after the last check.
     """
-    from mjxgait.distributed.evolve import crew_at
+    from mjxgait.distributed.evolve import scheduler_at
     from mjxgait.distributed.rows import Rows
     from mjxgait.training.ended import examine
     from mjxgait.training.loop import interruptible
@@ -33,7 +33,7 @@ def evolve_zoo(
     prepare_devices(1 if cluster else None)
     console, began = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
     screen = _Screen(console)
-    with interruptible() as interrupted, crew_at(cluster, console) as crew:
+    with interruptible() as interrupted, scheduler_at(cluster, console) as scheduler:
         begin()
         with locked(zoo):
             told, seeds = interrupted.is_set, read_seeds(zoo)
@@ -41,7 +41,7 @@ def evolve_zoo(
             creature, config = open_run(folders[0])
             again = command("train", "--resume", zoo, run=folders[0])
             rows = Rows(creature, folders, keep_every=config.keep_every, together=seeds.together)
-            ended = rows.to_the_end(None, crew, screen.evolved, told) is not None
+            ended = rows.to_the_end(None, scheduler, screen.evolved, told) is not None
             ended = ended and examine(zoo, folders, again, screen.examined, told)
     if not ended:
         console.print(f"interrupted; go on with: {again}")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mjxgait.config.layers import install_command
-from mjxgait.distributed.scheduler import Crew
+from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
 
 
@@ -104,13 +104,15 @@ PATIENCE = 5.0
 
 @contextlib.contextmanager
 def connected(
-    address: str, tell: Callable[[str], object], watch: Callable[[Crew], object] = lambda crew: None
-) -> Iterator[Crew]:
+    address: str,
+    tell: Callable[[str], object],
+    watch: Callable[[Scheduler], object] = lambda scheduler: None,
+) -> Iterator[Scheduler]:
     """Connect to a Ray cluster and yield its crew; all that it runs for us ends with the block.
 
     Args:
       address: HOST:PORT, or auto for the cluster that this machine belongs to.
-      tell, watch: see `Crew`.
+      tell, watch: see `Scheduler`.
 
     Raises:
       UserError: Ray is not installed, no head answers, or a machine has other versions than this.
@@ -129,10 +131,10 @@ def connected(
             f"--cluster {address}: {reason} (is this machine a part of it, by `ray start`? "
             "Has it the token, if there is one?)"
         ) from None
-    from mjxgait.distributed.ray_backend import Machines
+    from mjxgait.distributed.ray_backend import RayBackend
 
     try:
-        yield Crew(Machines(tell), tell, watch)
+        yield Scheduler(RayBackend(tell), tell, watch)
     finally:
         ray.shutdown()
 
@@ -145,7 +147,7 @@ def _ray() -> Any:
         raise UserError(
             f"--cluster needs Ray: {install_command('cluster')}, on every machine of the cluster"
         ) from None
-    # `Machines` reports lost machines; Ray's threads need not.
+    # `RayBackend` reports lost machines; Ray's threads need not.
     logging.getLogger("ray").setLevel(logging.CRITICAL)
     return ray
 

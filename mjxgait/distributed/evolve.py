@@ -17,7 +17,7 @@ from mjxgait.creature import Creature
 from mjxgait.distributed import islands
 from mjxgait.distributed.connect import connected
 from mjxgait.distributed.rows import Blocks
-from mjxgait.distributed.scheduler import Crew, Here
+from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.errors import UserError
 from mjxgait.training import loop
 from mjxgait.training.screen import Screen
@@ -28,20 +28,20 @@ A_SECOND = 4
 
 
 @contextlib.contextmanager
-def crew_at(address: str | None, console: Console | None = None) -> Iterator[Crew]:
+def scheduler_at(address: str | None, console: Console | None = None) -> Iterator[Scheduler]:
     """Yield the crew of the cluster at an address, shown live; without one this process alone.
 
     Raises:
       UserError: see `connected`.
     """
     if address is None:
-        yield Crew(Here())
+        yield Scheduler(LocalBackend())
         return
-    with Board(console) as board, connected(address, board.tell, board.watch) as crew:
-        yield crew
+    with Dashboard(console) as board, connected(address, board.tell, board.watch) as scheduler:
+        yield scheduler
 
 
-class Board:
+class Dashboard:
     """Live table of what each machine does."""
 
     def __init__(self, console: Console | None = None) -> None:
@@ -66,24 +66,24 @@ class Board:
         """Print a message on its own line."""
         self.console.print(f"cluster: {said}")
 
-    def watch(self, crew: Crew) -> None:
+    def watch(self, scheduler: Scheduler) -> None:
         """Update the table."""
         if self.console.is_terminal and time.monotonic() - self._shown > 1 / A_SECOND:
             self._shown = time.monotonic()
-            self._live.update(table(crew))
+            self._live.update(table(scheduler))
 
 
-def table(crew: Crew) -> Table:
+def table(scheduler: Scheduler) -> Table:
     """Make a row per machine: its workers, how many of them work, and the jobs it has done."""
-    busy = Counter(worker.node for worker in crew.busy)
-    there = busy + Counter(worker.node for worker in crew.idle)
+    busy = Counter(worker.node for worker in scheduler.busy)
+    there = busy + Counter(worker.node for worker in scheduler.idle)
     shown = Table("machine", box=None, pad_edge=False)
     for heading in ("workers", "at work", "done"):
         shown.add_column(heading, justify="right")
-    for node in sorted(there.keys() | crew.done.keys()):
-        counts = (there[node], busy[node], crew.done.get(node, 0))
+    for node in sorted(there.keys() | scheduler.done.keys()):
+        counts = (there[node], busy[node], scheduler.done.get(node, 0))
         shown.add_row(node, *map(str, counts))
-    shown.caption = f"pieces of work left: {crew.open}"
+    shown.caption = f"pieces of work left: {scheduler.open}"
     return shown
 
 
@@ -120,10 +120,10 @@ def evolve(
             if not resume:
                 held.enter_context(locked(folder))
 
-        crew = held.enter_context(crew_at(cluster, screen.console))
+        scheduler = held.enter_context(scheduler_at(cluster, screen.console))
         if several:
-            return islands.train(folder, creature, config, screen, crew, resume, begin_new)
-        evaluator = Blocks(crew, creature, config) if cluster else None
+            return islands.train(folder, creature, config, screen, scheduler, resume, begin_new)
+        evaluator = Blocks(scheduler, creature, config) if cluster else None
         return loop.train(
             folder, creature, config, screen, resume, generation, evaluator, begin_new
         )

@@ -20,7 +20,7 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import Advanced, AdvanceIsland, Lines
 from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.scheduler import Crew
+from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.evolution.state import stop_reason
 from mjxgait.training.checkpoint import Checkpoints, Packed
 from mjxgait.training.examination import Examined, Examiner, Exams, why_ended
@@ -145,7 +145,7 @@ def train(
     creature: Creature,
     config: Config,
     screen: Screen,
-    crew: Crew,
+    scheduler: Scheduler,
     resume: bool,
     begin: Callable[[], object] = lambda: None,
 ) -> bool:
@@ -169,7 +169,7 @@ def train(
         with interruptible() as interrupted:
             while reason is None:
                 start = time.perf_counter()
-                found = islands.advance(crew, interrupted.is_set)
+                found = islands.advance(scheduler, interrupted.is_set)
                 if not found:
                     break
                 for line in islands.keep(found, time.perf_counter() - start):
@@ -221,14 +221,14 @@ class _Islands:
         self.generation = self._common() if resume else -1
         self._return_to(self.generation)
 
-    def advance(self, crew: Crew, stopped: Callable[[], bool]) -> list[Advanced] | None:
+    def advance(self, scheduler: Scheduler, stopped: Callable[[], bool]) -> list[Advanced] | None:
         """Advance all islands to the next exchange or to the end; None when stopped."""
         stride = self.settings.every or self.config.checkpoint_every
         until = (max(self.generation, 0) // stride + 1) * stride
         until = min(until, self.config.evolution.generations)
         sent = enumerate(self._sent())
         work = ((self.recipe, AdvanceIsland(state, until, i)) for i, state in sent)
-        return crew.all(work, stopped)
+        return scheduler.all(work, stopped)
 
     def keep(self, found: list[Advanced], seconds: float) -> list[dict[str, Any]]:
         """Write all states to disk; return the metrics lines of all islands together.

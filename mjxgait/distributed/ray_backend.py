@@ -28,7 +28,7 @@ from mjxgait.distributed import connect
 from mjxgait.distributed.connect import Machine
 from mjxgait.distributed.jobs import Job
 from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.scheduler import Hands, Report, Worker
+from mjxgait.distributed.scheduler import Backend, Report, Worker
 
 ENVIRONMENT = {
     "NPROC": "1",  # XLA's threads
@@ -117,8 +117,8 @@ class Node:
     cores: int
 
 
-class Machines(Hands):
-    """See `Hands`. tell: called with messages for the user.
+class RayBackend(Backend):
+    """See `Backend`. tell: called with messages for the user.
 
     Raises:
       UserError: a machine that is there from the beginning has other versions than this one.
@@ -154,7 +154,7 @@ class Machines(Hands):
         return [worker for ref in _ready(self._coming) if (worker := self._begun(ref))]
 
     def start(self, worker: Worker, recipe: Recipe, job: Job) -> None:
-        """See `Hands`. A recipe is sent to each machine once."""
+        """See `Backend`. A recipe is sent to each machine once."""
         if recipe.digest not in self._recipes:
             self._recipes[recipe.digest] = ray.put(recipe)
         actor, _ = self._actors[worker]

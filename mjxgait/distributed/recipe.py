@@ -19,7 +19,7 @@ from mjxgait.plugins import build_config
 from mjxgait.plugins.user_code import is_loaded, load, loaded
 from mjxgait.training.blueprint import Plan, draw_up
 from mjxgait.training.experiment import Batch, Latest, Shape, Step, build_batch, shape_of
-from mjxgait.training.stages import Stages, Turn, at_once, compiled
+from mjxgait.training.stages import CompiledGeneration, Turn, at_once, compiled
 from mjxgait.types import Asked, Judged
 
 
@@ -110,7 +110,7 @@ class Programs:
         self._turn = turn
         self._batches: Latest[tuple[BatchShape, Batch]] = Latest(KEPT)
         self._plans: Latest[Plan] = Latest(KEPT)
-        self._stages: Latest[Stages] = Latest(KEPT)
+        self._stages: Latest[CompiledGeneration] = Latest(KEPT)
         self._judges: Latest[jax.stages.Compiled] = Latest(KEPT)
 
     def batch(self, recipe: Recipe) -> Batch:

@@ -13,7 +13,7 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import Advanced, AdvanceRows, Job, Judge
 from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.scheduler import Crew
+from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.checkpoint import Checkpoints, Packed, side_by_side
@@ -55,7 +55,7 @@ class Rows:
     def to_the_end(
         self,
         begin: Mapping[str, np.ndarray] | None,
-        crew: Crew,
+        scheduler: Scheduler,
         tell: Tell,
         stopped: Callable[[], bool],
     ) -> Packed | None:
@@ -73,7 +73,7 @@ class Rows:
                 tell(generation, self.last, None)
             while generation < self.last:
                 until = min((max(generation, 0) // stride + 1) * stride, self.last)
-                if (done := crew.all(self._work(state, begin, until), stopped)) is None:
+                if (done := scheduler.all(self._work(state, begin, until), stopped)) is None:
                     return None
                 advanced = _joined(done)
                 state, generation = advanced.packed, until
@@ -151,8 +151,8 @@ class Blocks:
       UserError: the offspring of a generation cannot be cut into equal chunks of about that size.
     """
 
-    def __init__(self, crew: Crew, creature: Creature, config: Config) -> None:
-        self._crew, self._recipe = crew, Recipe.of(creature, [config])
+    def __init__(self, scheduler: Scheduler, creature: Creature, config: Config) -> None:
+        self._crew, self._recipe = scheduler, Recipe.of(creature, [config])
         self.size = block_size(config.evolution.offspring, config.rollout.block)
 
     def judge(

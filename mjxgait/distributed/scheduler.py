@@ -53,7 +53,7 @@ class Report:
     error: Exception | None = None
 
 
-class Hands(Protocol):
+class Backend(Protocol):
     """Backend: provides workers and runs jobs on them."""
 
     def arrivals(self) -> list[Worker]:
@@ -93,7 +93,7 @@ def _never() -> bool:
     return False
 
 
-class Crew:
+class Scheduler:
     """Available workers and their jobs.
 
     tell: called with messages for the user. watch: called with the crew now and then.
@@ -101,9 +101,9 @@ class Crew:
 
     def __init__(
         self,
-        hands: Hands,
+        hands: Backend,
         tell: Callable[[str], object] = lambda said: None,
-        watch: Callable[["Crew"], object] = lambda crew: None,
+        watch: Callable[["Scheduler"], object] = lambda scheduler: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.hands, self._tell, self._watch, self._clock = hands, tell, watch, clock
@@ -220,8 +220,8 @@ class Crew:
             self._tell("no worker is connected; waiting for machines to join")
 
 
-class Here(Hands):
-    """See `Hands`. programs: those that this process has already compiled."""
+class LocalBackend(Backend):
+    """See `Backend`. programs: those that this process has already compiled."""
 
     def __init__(self, programs: Programs | None = None) -> None:
         self._programs = programs or Programs()
@@ -238,7 +238,7 @@ class Here(Hands):
         self._work = worker, recipe, job
 
     def wait(self, seconds: float) -> list[Report]:
-        """See `Hands`. An error of the job is raised unchanged."""
+        """See `Backend`. An error of the job is raised unchanged."""
         if self._work is None:
             return []
         (worker, recipe, job), self._work = self._work, None

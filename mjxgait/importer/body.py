@@ -157,7 +157,7 @@ def _has_volume(points: np.ndarray) -> bool:
 FREE_POS, FREE_DOF = 7, 6
 
 
-class Puppet:
+class KinematicModel:
     """Kinematic model of the bodies.
 
     low, high: [J] limits in rad, infinite where there is none. feet: for each foot the places of

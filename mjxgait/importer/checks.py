@@ -6,7 +6,7 @@ import numpy as np
 from mjxgait.creature import geometry
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import Anatomy
-from mjxgait.importer.body import Puppet
+from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.parts import BALL, HINGE, Notes, listed
 
 
@@ -68,7 +68,7 @@ TOLERANCE = 1e-6
 
 
 def check_same(
-    model: mujoco.MjModel, anatomy: Anatomy, puppet: Puppet, made: mujoco.MjModel
+    model: mujoco.MjModel, anatomy: Anatomy, puppet: KinematicModel, made: mujoco.MjModel
 ) -> None:
     """Compare the compiled file with the written creature, body by body and joint by joint.
 
@@ -101,7 +101,7 @@ def check_same(
 def _places(
     model: mujoco.MjModel,
     anatomy: Anatomy,
-    puppet: Puppet,
+    puppet: KinematicModel,
     made: mujoco.MjModel,
     source: list[int],
     own: list[int],

@@ -14,7 +14,7 @@ from mjxgait.creature import geometry
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import in_plane
 from mjxgait.importer.balance import steady_balance
-from mjxgait.importer.body import Puppet, creature_xml
+from mjxgait.importer.body import KinematicModel, creature_xml
 from mjxgait.importer.checks import check_same, tell_dropped, tell_left_out
 from mjxgait.importer.clean import clean_mjcf, clean_urdf
 from mjxgait.importer.find import find_anatomy
@@ -122,7 +122,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
         notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
     tell_left_out(model, anatomy, notes)
     bodies = build_bodies(model, anatomy, source.efforts, notes)
-    puppet = Puppet(
+    puppet = KinematicModel(
         bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root)
     )
     start = first_pose(puppet, model, anatomy)
@@ -238,7 +238,7 @@ def _folder(
 
 
 def _stated_pairs(
-    puppet: Puppet, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray], planar: bool
+    puppet: KinematicModel, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray], planar: bool
 ) -> dict[str, tuple[str, int]]:
     """Partner and sign of each joint that the geometry alone does not determine.
 

@@ -8,7 +8,7 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjxgait.importer.body import Puppet
+from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.parts import Notes, listed
 from mjxgait.importer.soles import Stance
 
@@ -88,7 +88,9 @@ class Drive:
     turn: dict[str, float] = dataclasses.field(default_factory=dict)
 
 
-def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, notes: Notes) -> Drive:
+def plan_drive(
+    puppet: KinematicModel, q: np.ndarray, stance: Stance, planar: bool, notes: Notes
+) -> Drive:
     """Plan the drive of a body that faces +x in its standing pose [J]."""
     feet = len(puppet.feet)
     roles, moves = _roles(puppet, q, stance)
@@ -125,7 +127,7 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     return drive
 
 
-def _own_inertia(puppet: Puppet) -> np.ndarray:
+def _own_inertia(puppet: KinematicModel) -> np.ndarray:
     """Inertia [J] kg m² that each joint moves when the body floats free in the latest pose.
 
     It includes the armature.
@@ -136,7 +138,7 @@ def _own_inertia(puppet: Puppet) -> np.ndarray:
     return 1 / np.diag(np.linalg.inv(mass))[6:]
 
 
-def _add_armature(puppet: Puppet, drive: Drive, own: np.ndarray, notes: Notes) -> None:
+def _add_armature(puppet: KinematicModel, drive: Drive, own: np.ndarray, notes: Notes) -> None:
     """Raise the armature of light joints so that stable PD can hold the weight with them.
 
     own: [J] inertia. The added armature is like the rotor of a motor of that strength.
@@ -154,7 +156,7 @@ def _add_armature(puppet: Puppet, drive: Drive, own: np.ndarray, notes: Notes) -
         )
 
 
-def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np.ndarray]:
+def _roles(puppet: KinematicModel, q: np.ndarray, stance: Stance) -> tuple[list[str], np.ndarray]:
     """Role of each joint, and the mean motion [J, 3] m/rad that it gives its feet."""
     soles = puppet.sole_points(*puppet.pose(q))
     middles = [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * stance.hip].mean(0) for sole in soles]
@@ -183,7 +185,7 @@ def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np
     return roles, mean
 
 
-def _ranges(puppet: Puppet, q: np.ndarray, roles: list[str]) -> np.ndarray:
+def _ranges(puppet: KinematicModel, q: np.ndarray, roles: list[str]) -> np.ndarray:
     """Ranges [J, 2] deg about the standing angle, within the limits."""
     half = np.array([RANGES[role] for role in roles])
     low = np.maximum(-half, np.degrees(np.where(np.isfinite(puppet.low), puppet.low, -1e3) - q))
@@ -191,7 +193,7 @@ def _ranges(puppet: Puppet, q: np.ndarray, roles: list[str]) -> np.ndarray:
     return np.stack([np.minimum(low, 0.0), np.maximum(high, 0.0)], 1)
 
 
-def _bend_one_way(puppet: Puppet, q: np.ndarray, drive: Drive, notes: Notes) -> None:
+def _bend_one_way(puppet: KinematicModel, q: np.ndarray, drive: Drive, notes: Notes) -> None:
     """Keep a knee without stated limits on the side to which it is bent in the stance."""
     sided = []
     soles = puppet.sole_points(*puppet.pose(q))
@@ -224,7 +226,7 @@ def _bend_one_way(puppet: Puppet, q: np.ndarray, drive: Drive, notes: Notes) -> 
         )
 
 
-def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
+def _steering(puppet: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
     """Set the steering weights: left legs stride longer, and a spine joint bends about z."""
     for f in range(len(puppet.feet)):
         side = float(puppet.data.xpos[puppet.feet[f][0] + 1][1])
@@ -245,14 +247,14 @@ def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -
         )
 
 
-def _must_step(puppet: Puppet, stance: Stance) -> bool:
+def _must_step(puppet: KinematicModel, stance: Stance) -> bool:
     """Return whether the body stands on one foot in each step: at most two feet, side by side."""
     ahead = [puppet.data.xpos[group[0] + 1][0] for group in puppet.feet]
     return len(puppet.feet) <= STEPPERS and bool(np.ptp(ahead) < APART * stance.hip)
 
 
 def _stepping(
-    puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
+    puppet: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
 ) -> None:
     """Set the stepping weights.
 
@@ -273,7 +275,9 @@ def _stepping(
             drive.turn[puppet.names[turns[0]]] = float(np.sign(upright[turns[0]]))
 
 
-def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool) -> None:
+def _balance(
+    puppet: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
+) -> None:
     """Set the balance weights.
 
     Nose down: front feet push down, hind feet give way, toes press. Right side down: the feet move

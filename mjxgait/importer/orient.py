@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from mjxgait.importer.body import Puppet
+from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.parts import Confidence, Notes, listed
 
 FRONT_WORDS, BACK_WORDS = (
@@ -44,7 +44,9 @@ def yaw_to(forward: np.ndarray) -> np.ndarray:
     return np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]])
 
 
-def find_forward(puppet: Puppet, q: np.ndarray, told: str | None, notes: Notes) -> np.ndarray:
+def find_forward(
+    puppet: KinematicModel, q: np.ndarray, told: str | None, notes: Notes
+) -> np.ndarray:
     """Forward unit vector [3] in the world of the pose."""
     xpos, _ = puppet.pose(q)
     if told:
@@ -63,7 +65,7 @@ def find_forward(puppet: Puppet, q: np.ndarray, told: str | None, notes: Notes) 
     return FORWARDS[name]
 
 
-def _axis(puppet: Puppet, q: np.ndarray) -> tuple[str, Confidence, str]:
+def _axis(puppet: KinematicModel, q: np.ndarray) -> tuple[str, Confidence, str]:
     """Walking axis (x or y), its confidence and the reason."""
     axes = puppet.data.xaxis[1:]
     if is_planar(puppet, q) is not None:
@@ -87,7 +89,7 @@ def _axis(puppet: Puppet, q: np.ndarray) -> tuple[str, Confidence, str]:
     return ("x" if alike["x"] else "y"), "high", "the body is its own mirror image about it"
 
 
-def _two_sided(puppet: Puppet, forward: np.ndarray, q: np.ndarray) -> bool:
+def _two_sided(puppet: KinematicModel, forward: np.ndarray, q: np.ndarray) -> bool:
     """Return whether the left and right sides mirror each other.
 
     A biped seen from the side also equals its mirror image, but there each leg is its own partner.
@@ -96,7 +98,7 @@ def _two_sided(puppet: Puppet, forward: np.ndarray, q: np.ndarray) -> bool:
     return found is not None and bool((found[0] != np.arange(len(found[0]))).any())
 
 
-def swings(puppet: Puppet, q: np.ndarray) -> tuple[float, float]:
+def swings(puppet: KinematicModel, q: np.ndarray) -> tuple[float, float]:
     """Foot swing in m along x and along y, summed over the hinges of the legs."""
     soles = puppet.sole_points(*puppet.pose(q))
     width = np.minimum(puppet.high - puppet.low, WIDEST)[:, None]
@@ -108,7 +110,7 @@ def swings(puppet: Puppet, q: np.ndarray) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def _front(puppet: Puppet, xpos: np.ndarray, axis: np.ndarray) -> tuple[int, str]:
+def _front(puppet: KinematicModel, xpos: np.ndarray, axis: np.ndarray) -> tuple[int, str]:
     """Sign of the front along the axis, and its evidence in words."""
     score = 0.0
     for body, at in zip(puppet.bodies, xpos, strict=True):
@@ -144,7 +146,7 @@ def _named_front(name: str) -> int:
     return front - back
 
 
-def is_planar(puppet: Puppet, q: np.ndarray) -> np.ndarray | None:
+def is_planar(puppet: KinematicModel, q: np.ndarray) -> np.ndarray | None:
     """Lateral axis [3] of a planar body; else None.
 
     Its hinges are all parallel and its feet lie, or are kept, in one plane.
@@ -160,7 +162,7 @@ def is_planar(puppet: Puppet, q: np.ndarray) -> np.ndarray | None:
     return axes[0] if np.ptp(middles) < (0.4 if puppet.in_plane else 0.05) * height else None
 
 
-def planar_pairs(puppet: Puppet, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def planar_pairs(puppet: KinematicModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Partner and sign [J] of a planar body with two alike legs on one hip; else None."""
     if len(puppet.feet) != 2:
         return None
@@ -187,7 +189,7 @@ def planar_pairs(puppet: Puppet, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def find_mirror(
-    puppet: Puppet, q: np.ndarray, planar: bool, notes: Notes
+    puppet: KinematicModel, q: np.ndarray, planar: bool, notes: Notes
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Partner and sign [J] of a body that faces +x; None if it is not symmetric."""
     if planar:
@@ -216,7 +218,7 @@ def find_mirror(
 
 
 def _nearly_mirrored(
-    puppet: Puppet, q: np.ndarray
+    puppet: KinematicModel, q: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray] | None, str]:
     """Partner and sign [J] of a nearly symmetric body, and its differences in words.
 
@@ -247,7 +249,7 @@ def _nearly_mirrored(
     ) or "partners found, though the sides are not quite alike"
 
 
-def _mirrors(puppet: Puppet, q: np.ndarray, partner: np.ndarray, sign: np.ndarray) -> bool:
+def _mirrors(puppet: KinematicModel, q: np.ndarray, partner: np.ndarray, sign: np.ndarray) -> bool:
     """Return whether mirrored angles give the mirrored pose, tried on a random pose.
 
     Joints beside the plane of symmetry without a partner are ignored.

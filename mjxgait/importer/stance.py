@@ -5,7 +5,7 @@ Letters: `J` active joints, `F` feet.
 
 import numpy as np
 
-from mjxgait.importer.body import Puppet
+from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.parts import quaternion, rotation
 from mjxgait.importer.skeleton import height_of
 from mjxgait.importer.soles import Stance
@@ -24,7 +24,7 @@ def symmetric(q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray] | None) -> np
     return q if mirror is None else (q + mirror[1] * q[mirror[0]]) / 2
 
 
-def level(puppet: Puppet, q: np.ndarray) -> None:
+def level(puppet: KinematicModel, q: np.ndarray) -> None:
     """Tilt the trunk until the feet are level; a tilt that two feet leave open stays."""
     lowest = np.array([sole[sole[:, 2].argmin()] for sole in puppet.sole_points(*puppet.pose(q))])
     if len(lowest) < 2:
@@ -43,14 +43,14 @@ def level(puppet: Puppet, q: np.ndarray) -> None:
     puppet.turn(rotation(np.concatenate([[np.cos(half)], np.sin(half) * axis / max(sine, 1e-9)])))
 
 
-def drop(puppet: Puppet, q: np.ndarray, sink: float = 0.0) -> None:
+def drop(puppet: KinematicModel, q: np.ndarray, sink: float = 0.0) -> None:
     """Move the trunk over the origin, the lowest foot point on the floor or `sink` m in it."""
     lowest = min(float(sole[:, 2].min()) for sole in puppet.sole_points(*puppet.pose(q)))
     root = puppet.bodies[0]
     root.pos = np.array([0.0, 0.0, root.pos[2] - lowest - sink])
 
 
-def stance_of(puppet: Puppet, q: np.ndarray) -> Stance:
+def stance_of(puppet: KinematicModel, q: np.ndarray) -> Stance:
     """Stance in a pose [J]; the hip height is the mean height of each leg's first joint."""
     xpos, xrot = puppet.pose(q)
     floor = min(float(sole[:, 2].min()) for sole in puppet.sole_points(xpos, xrot))
@@ -69,7 +69,7 @@ def stance_of(puppet: Puppet, q: np.ndarray) -> Stance:
     return Stance(xpos, xrot, floor, max(float(np.mean(hips)), 0.02 * reach, 1e-3))
 
 
-def _leg_length(puppet: Puppet, foot: int) -> float:
+def _leg_length(puppet: KinematicModel, foot: int) -> float:
     """Leg length in m along the joints down to the sole, in the latest pose."""
     anchors = puppet.data.xanchor[[j + 1 for j in puppet.leg(foot)]]
     sole = puppet.sole_points(puppet.data.xpos[1:], puppet.data.xmat[1:].reshape(-1, 3, 3))[foot]
@@ -102,7 +102,7 @@ class Search:
 
     def __init__(
         self,
-        puppet: Puppet,
+        puppet: KinematicModel,
         start: np.ndarray,
         mirror: tuple[np.ndarray, np.ndarray] | None,
         planar: bool,

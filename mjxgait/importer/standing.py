@@ -8,7 +8,7 @@ import numpy as np
 
 from mjxgait.importer.anatomy import Anatomy
 from mjxgait.importer.balance import Held, hold
-from mjxgait.importer.body import Puppet, compile_own, creature_xml
+from mjxgait.importer.body import KinematicModel, compile_own, creature_xml
 from mjxgait.importer.drive import Drive, plan_drive
 from mjxgait.importer.parts import Body, Notes
 from mjxgait.importer.soles import guard_parts, lay_soles
@@ -33,7 +33,7 @@ AT_ITS_END = 0.05
 class Candidate:
     """A tried standing pose: bodies with foot geoms, the keyframe, and the stand test."""
 
-    puppet: Puppet
+    puppet: KinematicModel
     q: np.ndarray
     feet: list[list[str]]
     drive: Drive
@@ -43,13 +43,17 @@ class Candidate:
     notes: Notes
 
 
-def first_pose(puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy) -> np.ndarray:
+def first_pose(puppet: KinematicModel, model: mujoco.MjModel, anatomy: Anatomy) -> np.ndarray:
     """Pose [J] in which the anatomy was found."""
     return _angles(puppet, model, anatomy.qpos)
 
 
 def offered_poses(
-    puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy, source: Source, start: np.ndarray
+    puppet: KinematicModel,
+    model: mujoco.MjModel,
+    anatomy: Anatomy,
+    source: Source,
+    start: np.ndarray,
 ) -> list[tuple[str, np.ndarray]]:
     """Poses that the file offers, each with its description."""
     order = sorted(
@@ -71,7 +75,7 @@ def offered_poses(
     return [(what, q) for what, q in poses if np.isfinite(q).all()]
 
 
-def _angles(puppet: Puppet, model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
+def _angles(puppet: KinematicModel, model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
     hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
     q = np.array(
         [
@@ -83,7 +87,7 @@ def _angles(puppet: Puppet, model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarr
 
 
 def standing(
-    puppet: Puppet,
+    puppet: KinematicModel,
     offered: list[tuple[str, np.ndarray]],
     mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
@@ -132,7 +136,7 @@ def standing(
 
 
 def _try(
-    puppet: Puppet,
+    puppet: KinematicModel,
     q: np.ndarray,
     mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
@@ -140,7 +144,7 @@ def _try(
 ) -> Candidate:
     """Add foot geoms in a pose, and run the stand test."""
     notes, bodies = copy.deepcopy(notes), copy.deepcopy(puppet.bodies)
-    trial = Puppet(bodies, [group[0] for group in puppet.feet])
+    trial = KinematicModel(bodies, [group[0] for group in puppet.feet])
     level(trial, q)
     drop(trial, q)
     _keep_stops(trial, q)
@@ -149,7 +153,7 @@ def _try(
     feet = lay_soles(bodies, trial.feet, stance, planar, notes)
     guard_parts(bodies, trial.feet, trial.trunk, trial.segments(), stance, notes)
     _name_shapes(bodies)
-    made = Puppet(bodies, [group[0] for group in puppet.feet])
+    made = KinematicModel(bodies, [group[0] for group in puppet.feet])
     drop(made, q, SINK)
     qpos = made.qpos(q)
     model = compile_own(creature_xml("trial", bodies, qpos))
@@ -159,7 +163,7 @@ def _try(
     return Candidate(made, q, feet, drive, model, qpos, held, notes)
 
 
-def _keep_stops(puppet: Puppet, q: np.ndarray) -> None:
+def _keep_stops(puppet: KinematicModel, q: np.ndarray) -> None:
     """Keep the stops of joints that stand at an end of their range.
 
     Such a stop bears weight, like a straight knee's. Other limits are left to the controller,

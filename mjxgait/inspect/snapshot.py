@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.champion import Champion, codec_of, split_genome
+from mjxgait.champion import Champion, serializer_of, split_genome
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -188,7 +188,7 @@ def _locate(path: Path, generation: int | None) -> tuple[Path, int | None]:
 def _check_shape(
     folder: Path, arrays: Mapping[str, np.ndarray], creature: Creature, config: Config
 ) -> None:
-    shapes = codec_of(config.use.controller).shapes(config.controller, creature)
+    shapes = serializer_of(config.use.controller).shapes(config.controller, creature)
     prefix = "genomes." if config.evolution.body == 1.0 else "genomes.plan."
     for name, shape in shapes.items():
         wanted = (config.evolution.population, *shape)

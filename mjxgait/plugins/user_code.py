@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.certification.acceptance import HasCriteria, PlainDemands
+from mjxgait.certification.acceptance import HasCriteria, PlainCriteria
 from mjxgait.champion import Champion
 from mjxgait.config.schema import UseConfig
 from mjxgait.config.tables import build
@@ -29,7 +29,7 @@ from mjxgait.reference.controllers import Command, Memory
 
 
 class SameCode:
-    """See `Twin`. The memory's arrays are numbered."""
+    """See `ReferenceController`. The memory's arrays are numbered."""
 
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
         part: Any = find("controller", champion.controller)
@@ -51,12 +51,12 @@ class SameCode:
         self.program = jax.jit(jax.vmap(act))
 
     def init(self, count: int) -> Memory:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         leaves = (np.asarray(leaf) for leaf in self.first)
         return {str(i): np.repeat(leaf[None], count, axis=0) for i, leaf in enumerate(leaves)}
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
-        """See `Twin`. Padded to a power of two, so that few programs are compiled."""
+        """See `ReferenceController`. Padded to a power of two, so that few programs are compiled."""
         count = len(senses["time"])
         padding = (1 << (count - 1).bit_length()) - count
 
@@ -71,7 +71,7 @@ class SameCode:
         return np.asarray(command, float)[:count], {str(i): leaf for i, leaf in enumerate(kept)}
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `Twin`: NaN, because the controller may have no cycle."""
+        """See `ReferenceController`: NaN, because the controller may have no cycle."""
         count = len(next(iter(memory.values()))) if memory else 1
         return np.full(count, np.nan)
 
@@ -135,7 +135,7 @@ def load(kind: str, text: str) -> str:
     if kind == "controller":
         register(ControllerKind(known, cls.__module__, controller=cls, reference=SameCode))
     else:
-        criteria = partial(PlainDemands, cast(HasCriteria, cls))
+        criteria = partial(PlainCriteria, cast(HasCriteria, cls))
         register(TaskKind(known, cls.__module__, task=cls, criteria=criteria))
     return known
 

@@ -12,7 +12,7 @@ import numpy as np
 from typing_extensions import override
 
 from mjxgait.champion import Champion
-from mjxgait.controllers.key_poses.reference import PoseTwin
+from mjxgait.controllers.key_poses.reference import PoseReference
 from mjxgait.creature import Creature
 from mjxgait.reference.controllers import Command, Memory
 
@@ -20,7 +20,7 @@ ROUNDING = 1e-6
 """Positions by which a sum of steps may fall short of the next position."""
 
 
-class ChangingTwin:
+class ChangingReference:
     """Blend from one key-pose controller to another; both share one phase.
 
     Memory: `cycles` [S] done, `steps` [S], and `change` [S] s.
@@ -40,13 +40,13 @@ class ChangingTwin:
         seconds: float,
     ) -> None:
         self.before, self.after = (
-            PoseTwin(creature, champion, step) for champion in (before, after)
+            PoseReference(creature, champion, step) for champion in (before, after)
         )
         self.reads = tuple(dict.fromkeys((*self.before.reads, *self.after.reads)))
         self.step, self.changes, self.seconds = step, changes, seconds
 
     def init(self, count: int) -> Memory:
-        """See `Twin`; `count` must be the number of `changes`."""
+        """See `ReferenceController`; `count` must be the number of `changes`."""
         assert count == len(self.changes), "a change for each simulation"
         return {
             "cycles": np.zeros(count),
@@ -55,11 +55,11 @@ class ChangingTwin:
         }
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         return memory["cycles"] % 1.0
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         since = memory["steps"] * self.step - memory["change"]
         share = np.clip(since / self.seconds, 0.0, 1.0)
         old, new = (
@@ -73,11 +73,11 @@ class ChangingTwin:
         cycles = memory["cycles"] + slow + share * (fast - slow)
         return target, {**memory, "cycles": cycles, "steps": memory["steps"] + 1}
 
-    def _position(self, twin: PoseTwin, memory: Memory) -> np.ndarray:
+    def _position(self, twin: PoseReference, memory: Memory) -> np.ndarray:
         place = np.floor(self.phase(memory) * twin.length + ROUNDING)
         return place.astype(int) % twin.length
 
-    def _rate(self, twin: PoseTwin, target: np.ndarray, joint_pos: np.ndarray) -> np.ndarray:
+    def _rate(self, twin: PoseReference, target: np.ndarray, joint_pos: np.ndarray) -> np.ndarray:
         """Return cycles per step [S]; target, joint_pos: [S, J]."""
         if twin.settings.advance == "clock":
             return np.full(len(target), self.step / twin.tuning["period"])
@@ -85,7 +85,7 @@ class ChangingTwin:
         return (error < twin.tuning["threshold"]) / twin.length
 
 
-class HaltingTwin(PoseTwin):
+class HaltingReference(PoseReference):
     """Key-pose controller that stops on command: the cycle freezes, balance continues.
 
     halts: [S] s, moment of the command. fades: [S] s from the pose at that moment to the standing
@@ -104,7 +104,7 @@ class HaltingTwin(PoseTwin):
         self.halts, self.fades = halts, fades
 
     def init(self, count: int) -> Memory:
-        """See `Twin`; `count` must be the number of `halts`."""
+        """See `ReferenceController`; `count` must be the number of `halts`."""
         assert count == len(self.halts), "a halt for each simulation"
         return {**super().init(count), "halt": self.halts.copy(), "fade": self.fades.copy()}
 

@@ -17,7 +17,7 @@ Memory = Mapping[str, np.ndarray]
 """State that a controller keeps between control steps: arrays [S, ...] by name."""
 
 
-class Twin(Protocol):
+class ReferenceController(Protocol):
     """Reference controller of a champion. It holds constants only."""
 
     @property
@@ -48,12 +48,14 @@ class Twin(Protocol):
         ...
 
 
-def twin_of(creature: Creature, champion: Champion, step: float) -> Twin:
+def reference_of(creature: Creature, champion: Champion, step: float) -> ReferenceController:
     """Return the champion's controller in NumPy. step: s.
 
     Raises:
       UserError: the champion is not finite, or code of the user's own that was not named.
     """
     champion.check_finite(creature)
-    made: Twin = controller_kind(champion.controller).part("reference")(creature, champion, step)
+    made: ReferenceController = controller_kind(champion.controller).part("reference")(
+        creature, champion, step
+    )
     return made

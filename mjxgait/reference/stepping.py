@@ -14,7 +14,7 @@ import numpy as np
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.bodies import Bodies, wrapped
-from mjxgait.reference.controllers import Twin, twin_of
+from mjxgait.reference.controllers import ReferenceController, reference_of
 from mjxgait.reference.layout import Clearance
 from mjxgait.reference.outcome import (
     Fall,
@@ -42,18 +42,18 @@ def examined_model(creature: Creature) -> mujoco.MjModel:
 
 
 class Around(Protocol):
-    """Properties of the task that a simulation needs; see `tasks.Demands`."""
+    """Properties of the task that a simulation needs; see `tasks.AcceptanceCriteria`."""
 
     drag: float
     grown: bool
     leaps: bool
 
     def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """See `tasks.Demands`."""
+        """See `tasks.AcceptanceCriteria`."""
         ...
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `tasks.Demands`."""
+        """See `tasks.AcceptanceCriteria`."""
         ...
 
 
@@ -68,12 +68,12 @@ class Stepping:
         record: int,
         fall: Fall,
         task: Around,
-        twin: Twin | None = None,
+        twin: ReferenceController | None = None,
     ) -> None:
         self.creature, self.starts, self.fall = creature, starts, fall
         self.record, self.goal, self.task = record, starts.goal.copy(), task
         step = float(creature.model.opt.timestep)
-        self.twin = twin or twin_of(creature, champion, step)
+        self.twin = twin or reference_of(creature, champion, step)
         self.drive = Drive(creature, champion.drive, self.twin.command, step)
         model = examined_model(creature)
         self.bodies = Bodies(creature, model, starts, self.twin.reads, task.drag)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from mjxgait.controllers.sims_brain.reference import CENTRE, BrainTwin
+from mjxgait.controllers.sims_brain.reference import CENTRE, BrainReference
 from mjxgait.rendering.curves import ACCENT, DARK, MIDDLE, PALE
 
 READS: Mapping[str, int] = {
@@ -19,7 +19,7 @@ READS: Mapping[str, int] = {
 }
 """Number of its three inputs that a neuron uses; 1 for functions not listed."""
 NOTHING, ONE = 0, 1
-"""Input columns of constants, which are no cells; see `BrainTwin`."""
+"""Input columns of constants, which are no cells; see `BrainReference`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Network:
     wires: tuple[Wire, ...]
 
 
-def network_of(twin: BrainTwin, lit: bool) -> Network:
+def network_of(twin: BrainReference, lit: bool) -> Network:
     """Search breadth first from all hinges against the wires; cells not reached have no effect.
 
     lit: whether there is a light; else the light sensors are left out.
@@ -72,13 +72,13 @@ def network_of(twin: BrainTwin, lit: bool) -> Network:
     return Network(cells, tuple(wires))
 
 
-def kind_of(twin: BrainTwin, column: int) -> str:
+def kind_of(twin: BrainReference, column: int) -> str:
     """Return the function of the neuron in a column."""
     place = column - min(twin.place.values())
     return next(kind for kind, these in twin.alike.items() if place in these)
 
 
-def _inputs(twin: BrainTwin, number: int, lit: bool) -> Iterator[tuple[int, float]]:
+def _inputs(twin: BrainReference, number: int, lit: bool) -> Iterator[tuple[int, float]]:
     """Column and weight of every input that a cell uses."""
     first = min(twin.place.values())
     if number < 0:
@@ -94,7 +94,7 @@ def _inputs(twin: BrainTwin, number: int, lit: bool) -> Iterator[tuple[int, floa
         yield NOTHING if column in seen and not lit else column, weight
 
 
-def _cell(twin: BrainTwin, number: int, depth: int, lit: bool) -> Cell:
+def _cell(twin: BrainReference, number: int, depth: int, lit: bool) -> Cell:
     joints, parts = len(twin.hinges), len(twin.parts)
     given = [_written(column, weight) for column, weight in _inputs(twin, number, lit)]
     if number < 0:

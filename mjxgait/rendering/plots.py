@@ -7,13 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.config.schema import Config
-from mjxgait.controllers.sims_brain.reference import BrainTwin
+from mjxgait.controllers.sims_brain.reference import BrainReference
 from mjxgait.controllers.sims_brain.reference_body import IN_LIGHT
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.plugins import make_task
 from mjxgait.plugins.registry import what_ends
-from mjxgait.reference.controllers import twin_of
+from mjxgait.reference.controllers import reference_of
 from mjxgait.rendering import brain, filmstrip, genomes
 from mjxgait.rendering.brain import network_of
 from mjxgait.rendering.curves import FORMATS, Figures, Lines, figure, progress_figures, save
@@ -86,8 +86,8 @@ def _of_grown(run: Path, walk: Walk) -> Figures:
     if "graph.half" not in walk.champion.genome:
         return {}
     row = genomes.bodies_of(run, walk.champion)
-    twin = twin_of(walk.creature, walk.champion, walk.time_step)
-    assert isinstance(twin, BrainTwin)
+    twin = reference_of(walk.creature, walk.champion, walk.time_step)
+    assert isinstance(twin, BrainReference)
     thoughts = network_of(twin, walk.champion.task in IN_LIGHT)
     return {
         "graph": ((10, 4.6), lambda drawing: genomes.draw_graph(drawing, walk)),

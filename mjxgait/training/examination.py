@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certification import Certificate, Glance, certify, glance, rehearse
-from mjxgait.certification.acceptance import demands_of, promising
+from mjxgait.certification import Certificate, NominalCheck, certify, nominal_check, rehearse
+from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.stress import Stress, stress
 from mjxgait.champion import Champion
 from mjxgait.config.schema import Config, ExaminationConfig
@@ -106,7 +106,7 @@ class Seen:
     """A validated champion, before its examination. margin: used to choose."""
 
     champion: Champion
-    glance: Glance
+    nominal_check: NominalCheck
     margin: float
 
 
@@ -230,7 +230,7 @@ class Examiner:
         The disturbed walks stop once a margin of `beaten` is out of reach.
         """
         creature = champion.embodied(self.experiment.creature)
-        seen = glance(creature, champion)
+        seen = nominal_check(creature, champion)
         margin = seen.margin
         if margin >= wanted:
             settings = self.experiment.config.examination
@@ -247,7 +247,7 @@ class Examiner:
         )
         body = seen.champion.embodied(self.experiment.creature)
         self.examines.set()
-        certificate = certify(body, seen.champion, seen=seen.glance, attempts=attempt)
+        certificate = certify(body, seen.champion, seen=seen.nominal_check, attempts=attempt)
         beyond = None
         if certificate.passed and self.experiment.config.examination.level == "anywhere":
             self.tell("It walks; does it walk anywhere?")
@@ -280,11 +280,11 @@ def _promising(experiment: Experiment, state: EvolutionState, rank: int) -> bool
     """Return whether an individual's metrics justify an examination."""
     config, names = experiment.config, experiment.simulator.task.outcomes
     outcome = dict(zip(names, np.asarray(state.outcome[rank]).T, strict=True))
-    demands = demands_of(config.use.task, config.wish)
-    return promising(demands, outcome, config.rollout.seconds, experiment.creature)
+    acceptance = acceptance_of(config.use.task, config.wish)
+    return promising(acceptance, outcome, config.rollout.seconds, experiment.creature)
 
 
-class Looks:
+class Validation:
     """Asynchronous validations of one run, one at a time.
 
     The result is the same as if evolution had waited: a certified individual ends the run in the

@@ -26,7 +26,7 @@ from mjxgait.tasks.starts import Starts
 from mjxgait.training.blueprint import Numbers, Plan, draw_up
 from mjxgait.training.generation import Row, first_state, judge
 from mjxgait.training.stages import (
-    Stages,
+    CompiledGeneration,
     Turn,
     at_once,
     begin,
@@ -152,11 +152,11 @@ class Experiment:
         """Compile a generation; `evaluator` evaluates it elsewhere."""
         return self.step(self.stages(judges=evaluator is None), evaluator)
 
-    def stages(self, judges: bool = True) -> Stages:
+    def stages(self, judges: bool = True) -> CompiledGeneration:
         """See `Batch.stages`."""
         return Batch((self,)).stages(judges)
 
-    def step(self, stages: Stages, evaluator: Evaluator | None = None) -> Step:
+    def step(self, stages: CompiledGeneration, evaluator: Evaluator | None = None) -> Step:
         """Return the generation with compiled programs of this shape."""
         together = Batch((self,)).bound(stages, evaluator)
 
@@ -248,7 +248,7 @@ class Batch:
         """
         return self.bound(self.stages(judges=evaluator is None), evaluator)
 
-    def stages(self, judges: bool = True, turn: Turn = at_once) -> Stages:
+    def stages(self, judges: bool = True, turn: Turn = at_once) -> CompiledGeneration:
         """See `compile_stages`."""
         first = self.experiments[0]
         settings = first.config.controller, first.config.evolution
@@ -259,7 +259,7 @@ class Batch:
         """Lower the programs of a generation, equal for equal shapes; see `lower_stages`."""
         return lower_stages(self._blueprint, self.rows, self.abstract(), judges)
 
-    def bound(self, stages: Stages, evaluator: Evaluator | None = None) -> Step:
+    def bound(self, stages: CompiledGeneration, evaluator: Evaluator | None = None) -> Step:
         """Return the generation of these rows with compiled programs of their shape."""
         return partial(stages.step, *self.known, evaluator=evaluator)
 

@@ -26,7 +26,7 @@ from mjxgait.files import write_text
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.tasks.base import Task
 from mjxgait.training.checkpoint import Checkpoints
-from mjxgait.training.examination import Examined, Examiner, Exams, Looks, why_ended
+from mjxgait.training.examination import Examined, Examiner, Exams, Validation, why_ended
 from mjxgait.training.experiment import Experiment, Latest, Step, build_experiment
 from mjxgait.training.folder import (
     BODY,
@@ -43,7 +43,7 @@ from mjxgait.training.folder import (
 )
 from mjxgait.training.prescreen import tryout_of
 from mjxgait.training.screen import Screen
-from mjxgait.training.stages import Stages
+from mjxgait.training.stages import CompiledGeneration
 from mjxgait.training.stored import disk_errors
 
 
@@ -128,7 +128,7 @@ def _compiled(
         return _step(experiment, evaluator), first.result()
 
 
-_COMPILED: Latest[Stages] = Latest(2)
+_COMPILED: Latest[CompiledGeneration] = Latest(2)
 """Programs of this process's runs, so that the next seed in a notebook is not traced again."""
 
 
@@ -177,7 +177,7 @@ def _evolve(
     individual that ended it, if any.
     """
     config, creature = examiner.experiment.config, examiner.experiment.creature
-    looks, saved, examined = Looks(examiner), int(state.generation), None
+    looks, saved, examined = Validation(examiner), int(state.generation), None
     while True:
         reason, generation = stop_reason(state, config.evolution), int(state.generation)
         over = reason is not None or interrupted.is_set()

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.acceptance import Demands, demands_of
+from mjxgait.certification.acceptance import AcceptanceCriteria, acceptance_of
 from mjxgait.config.schema import Config
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.tasks.starts import Starts
@@ -82,9 +82,9 @@ class Tryout:
         return min(criterion.margin for criterion in criteria)
 
     @property
-    def _demands(self) -> Demands:
+    def _demands(self) -> AcceptanceCriteria:
         config = self.run.config
-        return demands_of(config.use.task, config.wish)
+        return acceptance_of(config.use.task, config.wish)
 
     @cached_property
     def _trials(self) -> Experiment:

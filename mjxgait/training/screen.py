@@ -12,7 +12,7 @@ from rich.status import Status
 from rich.table import Table
 
 from mjxgait.certification import Certificate
-from mjxgait.certification.acceptance import demands_of
+from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.certification.describe import in_words
 from mjxgait.config.schema import Config
 from mjxgait.creature.ground.spec import FLAT
@@ -111,7 +111,7 @@ class Screen:
         for row in certificate.rows():
             table.add_row(*row, style="bold" if row[-1] == "FAIL" else None)
         self.console.print(table)
-        report, does = certificate.report, demands_of(certificate.task).verdict
+        report, does = certificate.report, acceptance_of(certificate.task).verdict
         found = certificate.verdict
         verdict = f"Certified: {does}" if found.certified else "Not certified"
         if found.passed and found.reservation:

@@ -89,7 +89,7 @@ def at_once(name: str) -> AbstractContextManager[object]:
 
 
 @dataclasses.dataclass(frozen=True)
-class Stages:
+class CompiledGeneration:
     """Compiled programs of one shape; see `generation`.
 
     judge: None if another evaluator is used. promote: None if all individuals run all trials.
@@ -167,7 +167,7 @@ def lower_stages(
 
 def compile_stages(
     programs: Iterable[tuple[str, jax.stages.Lowered]], turn: Turn = at_once, long: bool = False
-) -> Stages:
+) -> CompiledGeneration:
     """Compile each program while the next is traced.
 
     long: whether proposing takes long (`Variation`). Crossover of expressions takes half a second
@@ -181,7 +181,7 @@ def compile_stages(
 
     with ThreadPoolExecutor() as aside:
         found = {part: aside.submit(in_turn, part, program) for part, program in programs}
-    return Stages(**{part: one.result() for part, one in found.items()})
+    return CompiledGeneration(**{part: one.result() for part, one in found.items()})
 
 
 def begin(

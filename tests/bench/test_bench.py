@@ -23,7 +23,7 @@ from mjxgait.bench.workload import Lap, Workload, walking
 from mjxgait.cli import bench
 from mjxgait.config.layers import data_folder, find_creature
 from mjxgait.config.schema import Config
-from mjxgait.controllers.key_poses.reference import READS, PoseTwin
+from mjxgait.controllers.key_poses.reference import READS, PoseReference
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.plugins import resolve_config
@@ -93,7 +93,7 @@ def test_the_law_is_the_examiners(creature, workload):
     )
     senses = sense(creature, state, READS)
     position, genome = np.arange(count) * 7, np.full(count, 1)
-    law, examiner = Law(creature, workload), PoseTwin(creature, champion, 0.005)
+    law, examiner = Law(creature, workload), PoseReference(creature, champion, 0.005)
     target = law.target(genome, position, pos, rot, v)
     np.testing.assert_allclose(
         target, examiner.target(position, senses, np.zeros(1, int)), atol=1e-12

@@ -19,7 +19,7 @@ from mjxgait.controllers.sims_brain.genotype import (
 )
 from mjxgait.controllers.sims_brain.operators import Genotype, Kin
 from mjxgait.controllers.sims_brain.phenotype import Body, body_of
-from mjxgait.controllers.sims_brain.reference import BrainTwin, fire
+from mjxgait.controllers.sims_brain.reference import BrainReference, fire
 from mjxgait.controllers.sims_brain.reference_body import NEURONS, grow
 from mjxgait.evolution.chance import key_of
 from mjxgait.rendering.brain import READS, draw_brain, kind_of, network_of, shape
@@ -107,15 +107,15 @@ def some() -> Genotype:
     return jax.vmap(KIN.create)(jax.random.split(key_of(11), 30))
 
 
-def brain_of(genotype: Genotype) -> BrainTwin:
+def brain_of(genotype: Genotype) -> BrainReference:
     """Of the body that it grows into, without the arrays."""
     genome = arrays_of(genotype)
     parts = grow(genome, CAPACITY.parts, CAPACITY.links)
     hinges = [(p, h) for p, part in enumerate(parts) for h in range(len(part.hinges))]
-    return BrainTwin(genome, parts, hinges, STEP)
+    return BrainReference(genome, parts, hinges, STEP)
 
 
-def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainTwin]:
+def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainReference]:
     """The links of all hinges, part by part, and the brain that moves them."""
     plain = brain_of(genotype)
     links = [
@@ -125,7 +125,7 @@ def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainTwin]:
     return links, plain
 
 
-def pulled(brain: BrainTwin, lit: bool) -> np.ndarray:
+def pulled(brain: BrainReference, lit: bool) -> np.ndarray:
     """Torques of some commands, under senses that are always the same. lit: with a light."""
     rng, memory, torques = np.random.default_rng(7), brain.init(3), []
     for _ in range(4):

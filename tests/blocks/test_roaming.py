@@ -11,7 +11,7 @@ import pytest
 from blocks.made_up import CALM
 
 from mjxgait.api import load_creature
-from mjxgait.certification.acceptance import demands_of, promising
+from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
 from mjxgait.config.schema import RolloutConfig
@@ -85,7 +85,7 @@ def test_the_examiner_sees_them_get_as_near(experiment: Experiment, evolved):
 def test_the_examiner_shows_the_light_in_each_blocks_own_axes(experiment: Experiment, evolved):
     champion = experiment.champion(evolved[0], {})
     body, light = champion.embodied(experiment.creature), np.array([3.0, -4.0, 1.0])
-    task = demands_of("follow-on-land")
+    task = acceptance_of("follow-on-land")
     start = dataclasses.replace(nominal_starts(body, 2), light=np.stack([light, 0 * light]))
     bodies = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task).bodies
     bodies.qpos[:, 3:7] = [0.5, -0.5, 0.1, 0.7]
@@ -105,7 +105,7 @@ def test_the_examiner_shows_the_light_in_each_blocks_own_axes(experiment: Experi
 def test_who_has_a_light_of_its_own_is_simulated_for_itself(experiment: Experiment, evolved):
     """Undisturbed it is like those with the same light, and like nobody else."""
     champion = experiment.champion(evolved[0], {})
-    body, task = champion.embodied(experiment.creature), demands_of("follow-on-land")
+    body, task = champion.embodied(experiment.creature), acceptance_of("follow-on-land")
     lights = np.array([[10.0, 0, 0], [0, 10.0, 0], [10.0, 0, 0]])
     start = dataclasses.replace(nominal_starts(body, 3), light=lights)
     stepping = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task)
@@ -281,11 +281,11 @@ def test_in_water_lights_are_at_the_corners_of_solids_and_at_crosses(task: Roam)
 
 
 def test_who_gets_nearer_to_all_lights_is_looked_at():
-    demands, creature = demands_of("follow-on-land"), load_creature("blocks")
+    acceptance, creature = acceptance_of("follow-on-land"), load_creature("blocks")
     outcome = {"way": np.array([2.0, 2.0]), "seconds": np.array([10.0, 10.0])}
-    assert promising(demands, outcome, 10.0, creature)
+    assert promising(acceptance, outcome, 10.0, creature)
     slow = {**outcome, "way": np.array([2.0, 0.9])}
-    assert not promising(demands, slow, 10.0, creature)
+    assert not promising(acceptance, slow, 10.0, creature)
 
 
 def test_what_a_follower_promised_counts_from_when_evolution_counted(task: Roam):
@@ -294,9 +294,9 @@ def test_what_a_follower_promised_counts_from_when_evolution_counted(task: Roam)
     standards = following.standards(settings)
     tally = following.update(following.init(), CALM, still, standards, jnp.ones(3))
     assert float(following.outcome(tally)["since"]) == pytest.approx(0.5, abs=task.step)
-    demands, config = demands_of("follow-on-land"), CertificateConfig()
+    acceptance, config = acceptance_of("follow-on-land"), CertificateConfig()
     for told, since in (({"since": 4.0}, 4.0), ({}, config.warmup)):
         nominal = {"way": 1.2, "seconds": 10.0, **told}
         champion = types.SimpleNamespace(origin={"nominal": nominal})
-        assert demands.since(champion, config) == since
-        assert demands.promise(champion, 10.0, config) == pytest.approx(1.2 / (10.0 - since))
+        assert acceptance.since(champion, config) == since
+        assert acceptance.promise(champion, 10.0, config) == pytest.approx(1.2 / (10.0 - since))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certification import CertificateConfig, certify, glance, rehearse, trials
+from mjxgait.certification import CertificateConfig, certify, nominal_check, rehearse, trials
 from mjxgait.certification.describe import (
     cost_of_transport,
     describe,
@@ -252,7 +252,7 @@ def test_what_may_lie_on_the_floor_crawls():
 
 
 def test_a_glance_is_the_part_that_the_undisturbed_walk_decides(tiny, trotter, certificate):
-    seen = glance(tiny, trotter, certificate.config)
+    seen = nominal_check(tiny, trotter, certificate.config)
     alone = min(c.margin for c in certificate.criteria if c.number not in (4, 5))
     assert seen.margin == alone
     again = certify(tiny, trotter, certificate.config, seen=seen)

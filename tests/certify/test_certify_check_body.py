@@ -7,7 +7,7 @@ import pytest
 from certify_made_up import make_champion
 from helpers import altered, short_examination
 
-from mjxgait.certification import glance
+from mjxgait.certification import nominal_check
 from mjxgait.certification.check_body import check_body
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.config.schema import Config
@@ -76,7 +76,7 @@ def test_an_error_in_the_shared_loader_is_named(tiny, thing):
 
 def test_nothing_is_examined_on_wrong_facts(tiny):
     with pytest.raises(UserError, match="hip height"):
-        glance(altered(tiny, frame={"hip_height": 0.1}), make_champion(tiny))
+        nominal_check(altered(tiny, frame={"hip_height": 0.1}), make_champion(tiny))
 
 
 def test_the_shipped_creatures_are_what_their_files_say(shipped):
@@ -126,9 +126,9 @@ def test_a_champion_has_the_pose_ranges_of_its_run(tiny, tmp_path):
     assert again.fingerprint == champion.fingerprint != make_champion(tiny).fingerprint
     body = again.embodied(tiny)
     assert np.allclose(body.joints.pose_high - body.joints.pose_low, np.radians(60.0))
-    assert glance(body, again, short_examination()).whole.trunk_pos.size
+    assert nominal_check(body, again, short_examination()).whole.trunk_pos.size
     with pytest.raises(UserError, match="lowest pose"):
-        glance(tiny, again, short_examination())
+        nominal_check(tiny, again, short_examination())
 
 
 def test_a_champion_without_a_span_is_written_as_ever(tiny, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from certify_made_up import make_champion
 from helpers import altered
 
-from mjxgait.controllers.key_poses.reference import READS, PoseTwin, pose_cycle
+from mjxgait.controllers.key_poses.reference import READS, PoseReference, pose_cycle
 from mjxgait.reference.layout import start_frame
 from mjxgait.reference.state import (
     ADDED,
@@ -66,7 +66,7 @@ def felt(creature, *arguments, **keys):
 
 
 def twin(creature, *arguments, **keys):
-    return PoseTwin(creature, make_champion(creature, *arguments, **keys), STEP)
+    return PoseReference(creature, make_champion(creature, *arguments, **keys), STEP)
 
 
 def drive(creature, **settings):

@@ -10,7 +10,7 @@ from mjxgait.certification import CertificateConfig, criteria, describe
 from mjxgait.certification.certificate import half_point
 from mjxgait.certification.criteria import Measure, obstacle
 from mjxgait.reference import measure
-from mjxgait.tasks.walk import criteria as demands
+from mjxgait.tasks.walk import criteria as acceptance
 
 CONFIG = CertificateConfig()
 
@@ -19,11 +19,11 @@ def failures(recording, halved=None, started=1.0, pushed=1.0):
     """Numbers of the failed criteria."""
     window = recording.window(CONFIG.warmup)
     judged = (
-        *demands.basic(recording, CONFIG),
+        *acceptance.basic(recording, CONFIG),
         criteria.starts(started, CONFIG),
         criteria.pushes(pushed, CONFIG),
-        demands.half_step(recording, halved or recording, CONFIG),
-        demands.gait(window, CONFIG.gait),
+        acceptance.half_step(recording, halved or recording, CONFIG),
+        acceptance.gait(window, CONFIG.gait),
         criteria.physics(window, CONFIG.physics),
         criteria.parts(window, CONFIG.parts),
     )

@@ -10,7 +10,7 @@ from certify_made_up import DOG, make_champion, walk
 
 from mjxgait.certification import CertificateConfig, rehearse, trials
 from mjxgait.certification import trials as rehearsal
-from mjxgait.certification.acceptance import demands_of, promising
+from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.config.schema import RolloutConfig
@@ -26,11 +26,11 @@ from mjxgait.reference.starts import (
     pushed_starts,
 )
 from mjxgait.tasks.hop import config as evolution
-from mjxgait.tasks.hop.criteria import HopDemands
+from mjxgait.tasks.hop.criteria import HopCriteria
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.hop.thresholds import HopConfig
 
-CONFIG, DEMANDS = CertificateConfig(), HopDemands()
+CONFIG, DEMANDS = CertificateConfig(), HopCriteria()
 FRAMES, STEP, GOAL = 4400, 0.005, 1.2
 
 
@@ -231,7 +231,7 @@ def test_nobody_is_tried_further_than_what_is_wanted_is_in_reach(
 @pytest.mark.parametrize("task", ["hop", "limbo"])
 def test_in_the_end_all_are_lost_but_those_that_succeed(tiny: Creature, task: str):
     """And nobody is lost before it cannot be mended any more."""
-    demands = demands_of(task)
+    acceptance = acceptance_of(task)
     beside = to((0, 0), (3, GOAL), drift=0.5)
     ways = [good(), good(), to((0, 0), (3, 1.0)), to((0, 0), (19, 0), (20, GOAL)), beside, good()]
     starts = nominal_starts(tiny, 6)
@@ -239,13 +239,13 @@ def test_in_the_end_all_are_lost_but_those_that_succeed(tiny: Creature, task: st
     clearance = np.array([*[0.02] * 5, -0.01 if task == "limbo" else np.inf])
     fell = np.array([np.inf, 21.0, *[np.inf] * 4])
     outcome = dataclasses.replace(became(ways, list(fell)), clearance=clearance)
-    lost = demands.lost(outcome, starts, FRAMES)
-    assert (~lost).tolist() == demands.succeeded(outcome, starts, CONFIG).tolist()
+    lost = acceptance.lost(outcome, starts, FRAMES)
+    assert (~lost).tolist() == acceptance.succeeded(outcome, starts, CONFIG).tolist()
     assert lost.tolist() == [False, True, True, True, True, task == "limbo"]
     # Who stands still may get there yet, until it must be there.
-    before = round((CONFIG.seconds - demands.wanted(CONFIG).stay) / STEP)
-    assert not demands.lost(outcome, starts, before)[[2, 3, 4]].any()
-    assert demands.lost(outcome, starts, before + 1)[[2, 3, 4]].all()
+    before = round((CONFIG.seconds - acceptance.wanted(CONFIG).stay) / STEP)
+    assert not acceptance.lost(outcome, starts, before)[[2, 3, 4]].any()
+    assert acceptance.lost(outcome, starts, before + 1)[[2, 3, 4]].all()
 
 
 def test_a_simulation_ends_when_those_that_are_lost_decide_it(tiny: Creature):
@@ -274,7 +274,7 @@ def test_a_simulation_ends_when_those_that_are_lost_decide_it(tiny: Creature):
 
 
 def test_walking_is_asked_to_stay_up_and_nothing_else(tiny: Creature):
-    walking, outcome = demands_of("walk"), became([to((0, 0))] * 2, [np.inf, 3.0])
+    walking, outcome = acceptance_of("walk"), became([to((0, 0))] * 2, [np.inf, 3.0])
     starts = nominal_starts(tiny, 2)
     assert walking.succeeded(outcome, starts, CONFIG).tolist() == [True, False]
     assert walking.aimed(starts, CONFIG) is starts
@@ -334,9 +334,9 @@ def test_a_goal_that_is_there_stays(tiny: Creature):
 
 
 def test_the_examiner_and_evolution_mean_the_same_goals():
-    demands = HopConfig()
-    assert (demands.goals, demands.nominal) == (evolution.GOALS, evolution.NOMINAL_GOAL)
-    assert demands.near == evolution.NEAR
+    acceptance = HopConfig()
+    assert (acceptance.goals, acceptance.nominal) == (evolution.GOALS, evolution.NOMINAL_GOAL)
+    assert acceptance.near == evolution.NEAR
 
 
 class Pointer:
@@ -362,7 +362,7 @@ class Pointer:
 
 @pytest.fixture
 def pointer(tiny: Creature, monkeypatch: pytest.MonkeyPatch) -> Champion:
-    monkeypatch.setattr("mjxgait.reference.stepping.twin_of", Pointer)
+    monkeypatch.setattr("mjxgait.reference.stepping.reference_of", Pointer)
     monkeypatch.setattr(Pointer, "phase", lambda self, memory: np.nan)
     return dataclasses.replace(make_champion(tiny), task="hop")
 

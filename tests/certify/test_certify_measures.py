@@ -27,7 +27,7 @@ from test_certify_criteria import (
 from mjxgait.certification import CertificateConfig, criteria
 from mjxgait.certification.criteria import Criterion
 from mjxgait.reference.measure import Recording
-from mjxgait.tasks.walk import criteria as demands
+from mjxgait.tasks.walk import criteria as acceptance
 
 CONFIG = CertificateConfig()
 AT = 3000
@@ -145,8 +145,8 @@ def judged(recording: Recording) -> list[Criterion]:
     """All criteria that one recording decides by itself."""
     window = recording.window(CONFIG.warmup)
     return [
-        *demands.basic(recording, CONFIG),
-        demands.gait(window, CONFIG.gait),
+        *acceptance.basic(recording, CONFIG),
+        acceptance.gait(window, CONFIG.gait),
         criteria.physics(window, CONFIG.physics),
     ]
 
@@ -192,8 +192,8 @@ def test_shares_of_starts_and_pushes():
     ids=["another verdict", "shorter", "longer"],
 )
 def test_half_the_time_step(halved: Callable[[], Recording], name: str):
-    assert failed(demands.half_step(walk(), halved(), CONFIG)) == {name}
-    assert failed(demands.half_step(walk(), walk(), CONFIG)) == set()
+    assert failed(acceptance.half_step(walk(), halved(), CONFIG)) == {name}
+    assert failed(acceptance.half_step(walk(), walk(), CONFIG)) == set()
 
 
 def test_a_longer_body_is_slower_in_its_own_lengths():

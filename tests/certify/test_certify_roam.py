@@ -16,9 +16,9 @@ from mjxgait.creature.geometry import lowest
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.sight import Grown, seen_grown
-from mjxgait.tasks.modular.criteria import JumpDemands, RoamDemands
+from mjxgait.tasks.modular.criteria import JumpCriteria, RoamCriteria
 
-CONFIG, DEMANDS = CertificateConfig(), RoamDemands()
+CONFIG, DEMANDS = CertificateConfig(), RoamCriteria()
 FRAMES, STEP, SPEED = 2200, 0.01, 0.4
 TIMES = np.arange(FRAMES) * STEP
 
@@ -117,7 +117,7 @@ def test_how_deep_a_block_is_in_the_ground_is_told_in_its_sizes():
 
 def test_who_is_off_the_ground_over_and_over_jumps():
     def failed(whole: Recording, halved: Recording) -> set[int]:
-        judged = JumpDemands().undisturbed(whole, halved, CONFIG)
+        judged = JumpCriteria().undisturbed(whole, halved, CONFIG)
         assert [c.number for c in judged] == [2, 6, 8, 9]
         return {c.number for c in judged if not c.passed}
 
@@ -132,7 +132,7 @@ def test_who_is_off_the_ground_over_and_over_jumps():
     told = {"seconds": 8.0, "height": 0.2}
     champion: Any = SimpleNamespace(terms={"height": 9.0}, origin={"nominal": told})
     for later in (0.0, 9.0):
-        (again,) = JumpDemands().kept(champion, jump(0.17, since=later), CONFIG)
+        (again,) = JumpCriteria().kept(champion, jump(0.17, since=later), CONFIG)
         assert again.passed == (later == 0.0), "in as many seconds as evolution saw"
 
 
@@ -144,7 +144,7 @@ def test_a_jumper_jumps_from_perturbed_starts_again_and_again():
     far, clear = np.zeros((4, 3)), np.full(4, np.inf)
     outcome = Outcome(np.full(4, np.inf), far, np.zeros((4, FRAMES)), clear, film, low=low)
     starts: Any = None
-    found = JumpDemands().succeeded(outcome, starts, CONFIG)
+    found = JumpCriteria().succeeded(outcome, starts, CONFIG)
     assert found.tolist() == [True, False, False, False]
 
 

@@ -13,12 +13,12 @@ from certify_made_up import make_champion
 
 from mjxgait.certification import (
     distance,
-    glance,
+    nominal_check,
     record,
     survival,
 )
 from mjxgait.certification.trials import simulate
-from mjxgait.controllers.key_poses.reference import PoseTwin
+from mjxgait.controllers.key_poses.reference import PoseReference
 from mjxgait.errors import UserError
 from mjxgait.reference.layout import start_frame
 from mjxgait.reference.measure import measure
@@ -75,7 +75,7 @@ def plain_loop(creature, champion, starts, row, seconds):
     mujoco.mj_setConst(model, data)
     mujoco.mj_resetData(model, data)
     step = model.opt.timestep
-    control, states = PoseTwin(creature, champion, step), []
+    control, states = PoseReference(creature, champion, step), []
     drive, memory = Drive(creature, champion.drive, "pose", step), control.init(1)
     torques = []
     data.qpos[:] = creature.stand_qpos
@@ -359,7 +359,7 @@ def test_what_is_not_a_number_is_refused_in_one_sentence(
 ):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=words):
-        glance(tiny, make_champion(tiny, poses, tuning))
+        nominal_check(tiny, make_champion(tiny, poses, tuning))
     # MuJoCo would leave a log where it is run, and say the same a thousand times.
     assert not list(tmp_path.iterdir())
     assert capfd.readouterr() == ("", "")

@@ -14,10 +14,10 @@ from mjxgait.reference.bodies import Water
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.sight import Grown, seen_grown
-from mjxgait.tasks.modular.criteria import SwimDemands
-from mjxgait.tasks.modular.follow_criteria import FollowDemands
+from mjxgait.tasks.modular.criteria import SwimCriteria
+from mjxgait.tasks.modular.follow_criteria import FollowCriteria
 
-CONFIG, DEMANDS = CertificateConfig(), SwimDemands()
+CONFIG, DEMANDS = CertificateConfig(), SwimCriteria()
 FRAMES, STEP, MASS, SPEED = 2200, 0.01, 10.0, 0.4
 TIMES = np.arange(FRAMES) * STEP
 
@@ -155,7 +155,7 @@ def test_a_follower_succeeds_by_its_centre_of_mass_from_two_seconds_on():
     outcome = disturbed(late * ways[:, None])
     starts: Any = SimpleNamespace(light=np.tile([0.0, 10.0, 0.0], (4, 1)))
     for drag in (500.0, 0.0):
-        found = FollowDemands(drag).succeeded(outcome, starts, CONFIG)
+        found = FollowCriteria(drag).succeeded(outcome, starts, CONFIG)
         assert found.tolist() == [True, False, False, False]
 
 

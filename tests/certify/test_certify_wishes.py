@@ -8,7 +8,7 @@ from certify_made_up import DOG, make_champion, walk
 from test_certify_measures import failed
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.acceptance import demands_of
+from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.certification.trials import simulate
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
@@ -38,7 +38,7 @@ def on_a_circle(rate: float, speed: float = 0.8, late: float = 0.0) -> Recording
 
 def missed(recording: Recording, **wish) -> set[str]:
     """Names of the measures of all criteria that fail under this wish."""
-    return failed(*demands_of("walk", wish).undisturbed(recording, recording, CONFIG))
+    return failed(*acceptance_of("walk", wish).undisturbed(recording, recording, CONFIG))
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_the_least_speed_and_stride_follow_what_is_asked():
 def test_who_does_just_what_was_asked_has_room(speed: float):
     """However slow that is: a run goes on until its walk has some."""
     asked = walk(speed=speed, period=0.9)
-    judged = demands_of("walk", {"speed": speed}).undisturbed(asked, asked, CONFIG)
+    judged = acceptance_of("walk", {"speed": speed}).undisturbed(asked, asked, CONFIG)
     speeds = [m for c in judged for m in c.measures if "speed" in m.name and "body" in m.name]
     assert min(m.margin for m in speeds) > 0.3
 
@@ -90,7 +90,7 @@ def test_a_turn_is_a_walk_along_the_heading_that_it_was_told():
     # Unasked it is a walk in circles, and has ended behind where it began.
     assert "drift / distance" in missed(turning)
     said = [
-        demands_of("walk", wish).report(turning, CONFIG)["obstacle"]
+        acceptance_of("walk", wish).report(turning, CONFIG)["obstacle"]
         for wish in ({}, {"turn": 30.0})
     ]
     assert said[0].startswith("went backwards")
@@ -117,15 +117,15 @@ def test_posture_is_held_from_both_sides():
 
 def test_a_missed_wish_names_the_number_in_its_way():
     quick = walk(speed=0.8, period=0.4)
-    judged = demands_of("walk", {"speed": 1.5}).undisturbed(quick, quick, CONFIG)
+    judged = acceptance_of("walk", {"speed": 1.5}).undisturbed(quick, quick, CONFIG)
     assert "1.5 m/s" in in_the_way(judged)
     assert in_the_way([as_asked(walk(), {"speed": 0.8}, CONFIG)]) is None
 
 
 def test_what_is_asked_is_in_the_report():
-    told = demands_of("walk", {"speed": 0.8}).report(walk(), CONFIG)
+    told = acceptance_of("walk", {"speed": 0.8}).report(walk(), CONFIG)
     assert told["asked"] == {"speed": 0.8}
-    assert "asked" not in demands_of("walk").report(walk(), CONFIG)
+    assert "asked" not in acceptance_of("walk").report(walk(), CONFIG)
 
 
 STEP = 0.005
@@ -156,7 +156,7 @@ def test_commands_go_both_ways_after_straight_on():
     assert ((abs(rates) >= 15.0) & (abs(rates) <= 30.0)).all()
     assert (rates > 0).sum() == 16
     assert len(np.unique(rates)) == 32
-    assert demands_of("walk", {"turn": 30.0}).commands(CONFIG, 9, STEP, None) is None
+    assert acceptance_of("walk", {"turn": 30.0}).commands(CONFIG, 9, STEP, None) is None
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_commands_go_both_ways_after_straight_on():
     ids=["soon", "three fall", "four fall", "late", "near", "off"],
 )
 def test_who_is_steered_looks_where_it_is_told(outcome: Outcome, passes: bool):
-    (criterion,) = demands_of("walk", {"steer": 30.0}).obeyed(outcome, told(), CONFIG)
+    (criterion,) = acceptance_of("walk", {"steer": 30.0}).obeyed(outcome, told(), CONFIG)
     assert (criterion.number, criterion.passed) == (11, passes)
 
 

@@ -9,7 +9,7 @@ from certify_made_up import DOG, make_champion, walk
 from helpers import small_config
 from test_certify_wishes import CONFIG, missed
 
-from mjxgait.certification.acceptance import demands_of
+from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.certification.describe import in_words, likeness
 from mjxgait.certification.trials import simulate
 from mjxgait.creature import Creature
@@ -53,7 +53,7 @@ def test_a_foot_that_loses_the_floor_for_a_moment_patters():
 
 
 def test_it_is_said_in_words():
-    report = demands_of("walk").report(like_an_animal(stride=0.7, duty=0.8), CONFIG)
+    report = acceptance_of("walk").report(like_an_animal(stride=0.7, duty=0.8), CONFIG)
     assert "Strides are 0.7" in in_words(report)
     assert "duty factors 0.8" in in_words(report)
     assert "loses the floor" not in in_words(report)

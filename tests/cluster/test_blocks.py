@@ -9,7 +9,7 @@ from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import AdvanceRows
 from mjxgait.distributed.recipe import Programs, Recipe
 from mjxgait.distributed.rows import Blocks, block_size
-from mjxgait.distributed.scheduler import Crew, Here
+from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.errors import UserError
 from mjxgait.training.experiment import build_experiment
 
@@ -38,7 +38,7 @@ def test_a_generation_by_blocks_is_that_of_one_program(stool: Creature, promote:
     config = small_config(rollout={"block": 3, "promote": promote})
     experiment = build_experiment(stool, config)
     alone = experiment.compile()
-    spread = experiment.compile(Blocks(Crew(Here()), stool, config))
+    spread = experiment.compile(Blocks(Scheduler(LocalBackend()), stool, config))
     state = experiment.place(experiment.init())
     (mine, counts), (theirs, others) = alone(state), spread(state)
     for one, other in zip(

@@ -5,14 +5,14 @@ import io
 import pytest
 from rich.console import Console
 
-from mjxgait.distributed.evolve import Board, table
-from mjxgait.distributed.scheduler import Crew, Here, Worker
+from mjxgait.distributed.evolve import Dashboard, table
+from mjxgait.distributed.scheduler import LocalBackend, Scheduler, Worker
 
 
 @pytest.fixture
-def crew() -> Crew:
+def scheduler() -> Scheduler:
     """Two workers of one machine, one at work; one of another, idle; a third machine has left."""
-    made = Crew(Here())
+    made = Scheduler(LocalBackend())
     one, other, third = Worker(0, "10.0.0.5"), Worker(1, "10.0.0.5"), Worker(2, "10.0.0.7")
     made.submit("work", lambda: (None, None))
     made.busy = {one: None}
@@ -21,18 +21,18 @@ def crew() -> Crew:
     return made
 
 
-def shown(crew: Crew, terminal: bool) -> str:
+def shown(scheduler: Scheduler, terminal: bool) -> str:
     out = io.StringIO()
     console = Console(file=out, force_terminal=terminal, width=80, highlight=False)
-    with Board(console) as board:
+    with Dashboard(console) as board:
         board.tell("10.0.0.6 has left")
-        board.watch(crew)
+        board.watch(scheduler)
     return out.getvalue()
 
 
-def test_a_row_per_machine(crew: Crew):
+def test_a_row_per_machine(scheduler: Scheduler):
     out = io.StringIO()
-    Console(file=out, width=80).print(table(crew))
+    Console(file=out, width=80).print(table(scheduler))
     head, *rows, caption = [line.split() for line in out.getvalue().splitlines()]
     assert head == ["machine", "workers", "at", "work", "done"]
     assert rows == [
@@ -43,7 +43,7 @@ def test_a_row_per_machine(crew: Crew):
     assert " ".join(caption) == "pieces of work left: 1"
 
 
-def test_in_a_terminal_it_is_a_table_and_elsewhere_lines(crew: Crew):
-    assert "cluster: 10.0.0.6 has left" in shown(crew, terminal=True)
-    assert "at work" in shown(crew, terminal=True)
-    assert shown(crew, terminal=False) == "cluster: 10.0.0.6 has left\n"
+def test_in_a_terminal_it_is_a_table_and_elsewhere_lines(scheduler: Scheduler):
+    assert "cluster: 10.0.0.6 has left" in shown(scheduler, terminal=True)
+    assert "at work" in shown(scheduler, terminal=True)
+    assert shown(scheduler, terminal=False) == "cluster: 10.0.0.6 has left\n"

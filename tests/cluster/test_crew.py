@@ -8,8 +8,8 @@ import pytest
 from mjxgait.distributed.scheduler import (
     FATAL,
     LATE,
-    Crew,
     Report,
+    Scheduler,
     Worker,
 )
 from mjxgait.errors import UserError
@@ -58,10 +58,10 @@ class Toys:
         return Report(worker, lost=fate) if fate else Report(worker, job**2)
 
 
-def crew_of(seconds: list[float], **others: Any) -> tuple[Crew, Toys, list[str]]:
+def crew_of(seconds: list[float], **others: Any) -> tuple[Scheduler, Toys, list[str]]:
     clock, said = Clock(), []
     toys = Toys(clock, seconds, **others)
-    return Crew(toys, said.append, clock=clock), toys, said
+    return Scheduler(toys, said.append, clock=clock), toys, said
 
 
 def work(*numbers: int) -> list[Any]:
@@ -69,95 +69,95 @@ def work(*numbers: int) -> list[Any]:
 
 
 def test_results_come_in_the_order_of_the_work_whoever_was_faster():
-    crew, toys, _ = crew_of([3.0, 1.0])
-    assert crew.all(work(1, 2, 3, 4, 5)) == [1, 4, 9, 16, 25]
+    scheduler, toys, _ = crew_of([3.0, 1.0])
+    assert scheduler.all(work(1, 2, 3, 4, 5)) == [1, 4, 9, 16, 25]
     assert len(toys.begun) == 5
-    assert crew.done == {"node 0": 1, "node 1": 4}
+    assert scheduler.done == {"node 0": 1, "node 1": 4}
 
 
 def test_what_a_lost_worker_had_is_done_by_another():
     lost = iter(["killed"])
-    crew, toys, said = crew_of([1.0, 1.0], fate=lambda worker: next(lost, None))
-    assert crew.all(work(1, 2, 3)) == [1, 4, 9]
+    scheduler, toys, said = crew_of([1.0, 1.0], fate=lambda worker: next(lost, None))
+    assert scheduler.all(work(1, 2, 3)) == [1, 4, 9]
     assert len(toys.begun) == 4
     assert said == ["node 1: a worker is lost (killed); its work is done again"]
 
 
 def test_work_that_costs_every_worker_ends_with_a_sentence():
-    crew, toys, _ = crew_of([1.0] * (FATAL + 3), fate=lambda worker: "out of memory")
+    scheduler, toys, _ = crew_of([1.0] * (FATAL + 3), fate=lambda worker: "out of memory")
     with pytest.raises(UserError, match=f"has cost {FATAL} workers.*out of memory.*smaller"):
-        crew.all(work(7))
+        scheduler.all(work(7))
     assert len(toys.begun) == FATAL
 
 
 def test_nobody_waits_long_for_one_that_stands_still():
     """The bound that docs/guide/cluster.md states: so many medians, and the time that another takes."""
-    crew, toys, _ = crew_of([1.0, 1e9])
-    assert crew.all(work(*range(8))) == [n**2 for n in range(8)]
+    scheduler, toys, _ = crew_of([1.0, 1e9])
+    assert scheduler.all(work(*range(8))) == [n**2 for n in range(8)]
     assert [number for number, _ in toys.begun].count(1) == 1
     assert toys.clock.now <= 7 + LATE + 1.0 + 1.0
 
 
 def test_late_work_is_given_to_one_other_and_not_to_all():
-    crew, toys, _ = crew_of([1.0, 1.0, 1.0, 50.0])
-    crew.all(work(*range(10)))
+    scheduler, toys, _ = crew_of([1.0, 1.0, 1.0, 50.0])
+    scheduler.all(work(*range(10)))
     slow = [job for number, job in toys.begun if number == 3]
     assert [job for _, job in toys.begun].count(slow[0]) == 2
 
 
 def test_what_comes_after_the_first_result_counts_for_nothing():
-    crew, _toys, _ = crew_of([1.0, 20.0])
-    assert crew.all(work(*range(8))) == [n**2 for n in range(8)]
-    assert crew.all(work(*range(40))) == [n**2 for n in range(40)]
-    assert sum(crew.done.values()) == 48
+    scheduler, _toys, _ = crew_of([1.0, 20.0])
+    assert scheduler.all(work(*range(8))) == [n**2 for n in range(8)]
+    assert scheduler.all(work(*range(40))) == [n**2 for n in range(40)]
+    assert sum(scheduler.done.values()) == 48
 
 
 def test_who_joins_later_gets_work():
-    crew, toys, _ = crew_of([1.0, 1.0])
+    scheduler, toys, _ = crew_of([1.0, 1.0])
     later = [toys.coming.pop()]
     toys.report = lambda worker, job: (
         toys.coming.extend(later),
         later.clear(),
         Report(worker, job),
     )[-1]
-    crew.all(work(*range(6)))
+    scheduler.all(work(*range(6)))
     assert {number for number, _ in toys.begun} == {0, 1}
 
 
 def test_an_error_of_the_work_is_raised_and_not_repeated():
-    crew, toys, _ = crew_of([1.0], fate=lambda worker: UserError("no such creature"))
+    scheduler, toys, _ = crew_of([1.0], fate=lambda worker: UserError("no such creature"))
     with pytest.raises(UserError, match="no such creature"):
-        crew.all(work(1))
+        scheduler.all(work(1))
     assert len(toys.begun) == 1
 
 
 def test_work_that_goes_on_comes_before_what_has_not_begun():
-    crew, _toys, _ = crew_of([1.0])
+    scheduler, _toys, _ = crew_of([1.0])
     for number in (1, 2):
-        crew.submit(number, lambda number=number: (None, number))
-    assert crew.next(lambda: False) == (1, 1)
-    crew.submit(1, lambda: (None, 10), first=True)
-    assert [crew.next(lambda: False) for _ in range(2)] == [(1, 100), (2, 4)]
+        scheduler.submit(number, lambda number=number: (None, number))
+    assert scheduler.next(lambda: False) == (1, 1)
+    scheduler.submit(1, lambda: (None, 10), first=True)
+    assert [scheduler.next(lambda: False) for _ in range(2)] == [(1, 100), (2, 4)]
 
 
 def test_work_is_made_when_somebody_is_there_to_do_it():
-    crew, _toys, _ = crew_of([1.0])
+    scheduler, _toys, _ = crew_of([1.0])
     made = []
     for number in range(3):
-        crew.submit(number, lambda number=number: (made.append(number), number))
-    crew.next(lambda: False)
+        scheduler.submit(number, lambda number=number: (made.append(number), number))
+    scheduler.next(lambda: False)
     assert made == [0]
 
 
 def test_told_to_stop_it_stops():
-    crew, _, _ = crew_of([1.0])
-    assert crew.all(work(1), stopped=lambda: True) is None
+    scheduler, _, _ = crew_of([1.0])
+    assert scheduler.all(work(1), stopped=lambda: True) is None
 
 
 def test_that_nobody_is_there_is_said_once():
-    crew, toys, said = crew_of([])
-    crew.submit(0, lambda: (None, 0))
-    assert crew.next(lambda: toys.clock.now > 500) is None
+    scheduler, toys, said = crew_of([])
+    scheduler.submit(0, lambda: (None, 0))
+    assert scheduler.next(lambda: toys.clock.now > 500) is None
     assert said == ["no worker is connected; waiting for machines to join"]
 
 
@@ -176,7 +176,7 @@ def test_whatever_is_lost_every_result_comes_exactly_once(seed: int):
         toys.coming.append(hired[-1])
         return "killed"
 
-    crew, toys, _ = crew_of(seconds, fate=fate)
-    assert crew.all(work(*range(600))) == [n**2 for n in range(600)]
+    scheduler, toys, _ = crew_of(seconds, fate=fate)
+    assert scheduler.all(work(*range(600))) == [n**2 for n in range(600)]
     assert len(hired) > 20
-    assert crew.open == 0
+    assert scheduler.open == 0

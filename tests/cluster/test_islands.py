@@ -14,7 +14,7 @@ from mjxgait.champion import read_champion
 from mjxgait.creature import Creature
 from mjxgait.distributed import islands
 from mjxgait.distributed.recipe import Programs
-from mjxgait.distributed.scheduler import Crew, Here
+from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.inspect.sections import island_facts
 from mjxgait.training.folder import Numbered, create_run, read_metrics, read_records
 from mjxgait.training.screen import Screen
@@ -30,7 +30,7 @@ def config(**of_islands: Any):
     )
 
 
-class Interrupted(Crew):
+class Interrupted(Scheduler):
     """One that is told to stop after so many pieces of work."""
 
     left = 4
@@ -41,12 +41,12 @@ class Interrupted(Crew):
 
 
 def run(
-    folder: Path, stool: Creature, settings: Any, kind: type[Crew] = Crew, resume=False
+    folder: Path, stool: Creature, settings: Any, kind: type[Scheduler] = Scheduler, resume=False
 ) -> bool:
     if not resume:
         create_run(folder, stool, settings)
     screen = Screen(Console(file=io.StringIO()))
-    return islands.train(folder, stool, settings, screen, kind(Here(PROGRAMS)), resume)
+    return islands.train(folder, stool, settings, screen, kind(LocalBackend(PROGRAMS)), resume)
 
 
 @pytest.fixture(scope="module")

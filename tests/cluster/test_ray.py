@@ -80,8 +80,8 @@ def study(
         if "generation" in news and todo:
             todo.pop()()
 
-    with connected(address, said.append) as crew:
-        assert run_study(folder, stool, plan, tell, crew)
+    with connected(address, said.append) as scheduler:
+        assert run_study(folder, stool, plan, tell, scheduler)
     return said
 
 
@@ -163,9 +163,9 @@ def test_a_machine_with_another_version_is_named_and_not_used(simulated: Any, tm
     path = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     said: list[str] = []
     end = time.monotonic() + 240
-    with connected(simulated.address, said.append) as crew:
+    with connected(simulated.address, said.append) as scheduler:
         odd = simulated.add(env_vars={"PYTHONPATH": path})
-        crew.next(lambda: any("jaxlib" in line for line in said) or time.monotonic() > end)
+        scheduler.next(lambda: any("jaxlib" in line for line in said) or time.monotonic() > end)
     assert any("has jaxlib 0.0.1, this machine has" in line for line in said)
     with pytest.raises(UserError, match=r"has jaxlib 0.0.1, this machine has .*same on both"):
         connected(simulated.address, said.append).__enter__()

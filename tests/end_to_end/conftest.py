@@ -23,7 +23,7 @@ from mjxgait.cli import main
 from mjxgait.config.tables import build
 from mjxgait.distributed import evolve as board
 from mjxgait.distributed.recipe import Programs
-from mjxgait.distributed.scheduler import Here
+from mjxgait.distributed.scheduler import LocalBackend
 from mjxgait.experiments.ablation import rows
 from mjxgait.training import loop
 
@@ -50,14 +50,14 @@ def sketched(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     """Let generations pass without a simulation, unless `--thorough` is given."""
     if not request.config.getoption("--thorough"):
         monkeypatch.setattr(loop, "_compiled", unevolved)
-        monkeypatch.setattr(board, "Here", partial(Unevolved, PROGRAMS))
+        monkeypatch.setattr(board, "LocalBackend", partial(Unevolved, PROGRAMS))
 
 
 @pytest.fixture
 def evolving(sketched: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compile and simulate generations as shipped."""
     monkeypatch.setattr(loop, "_compiled", COMPILED)
-    monkeypatch.setattr(board, "Here", partial(Here, PROGRAMS))
+    monkeypatch.setattr(board, "LocalBackend", partial(LocalBackend, PROGRAMS))
 
 
 @pytest.fixture

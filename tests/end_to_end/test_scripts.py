@@ -126,7 +126,14 @@ def certified(folder: Path) -> Path:
 @pytest.fixture
 def as_it_was():
     """Undoes what a benchmark changes in this process."""
-    watched = (loop, stages, experiment, looks.Looks, examination.Examiner, checkpoint.Checkpoints)
+    watched = (
+        loop,
+        stages,
+        experiment,
+        looks.Validation,
+        examination.Examiner,
+        checkpoint.Checkpoints,
+    )
     before = [dict(vars(place)) for place in watched]
     cached, path = jax.config.jax_enable_compilation_cache, list(sys.path)
     yield

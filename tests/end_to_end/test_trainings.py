@@ -29,7 +29,7 @@ from end_to_end.shipped import (
 )
 from helpers import STOOL, said_by
 
-from mjxgait.certification import CertificateConfig, glance
+from mjxgait.certification import CertificateConfig, nominal_check
 from mjxgait.champion import Champion, write_champion
 from mjxgait.controllers.key_poses.config import gene_names
 from mjxgait.kinds import meant_of_grown
@@ -155,7 +155,7 @@ def test_every_walker_can_be_examined_under_every_configuration(
     write_champion(made, creature, folder / CHAMPION)
     body, champion = open_champion(folder)
     assert champion.fingerprint == made.fingerprint
-    assert glance(body, champion, CertificateConfig(seconds=1.0, warmup=0.2)).criteria
+    assert nominal_check(body, champion, CertificateConfig(seconds=1.0, warmup=0.2)).criteria
 
 
 VARIANTS = {

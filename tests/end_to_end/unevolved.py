@@ -13,7 +13,7 @@ import numpy as np
 from mjxgait.champion import Champion
 from mjxgait.distributed.jobs import Advanced, AdvanceRows
 from mjxgait.distributed.recipe import Programs, Recipe
-from mjxgait.distributed.scheduler import Here, Report
+from mjxgait.distributed.scheduler import LocalBackend, Report
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.simulation.evaluator import Evaluator
@@ -73,14 +73,14 @@ def generation(
     return jax.device_get((later, metrics))
 
 
-class Unevolved(Here):
+class Unevolved(LocalBackend):
     """A worker that evolves nothing: champions are the first of the first population.
 
     Bodies, settings, starts and genomes are made as ever; no generation is compiled.
     """
 
     def wait(self, seconds: float) -> list[Report]:
-        """See `Hands`."""
+        """See `Backend`."""
         if self._work is None:
             return []
         (worker, recipe, job), self._work = self._work, None

@@ -14,7 +14,7 @@ from helpers import SHORT, STOOL, said_by
 
 import mjxgait
 from mjxgait.certification.trials import simulate
-from mjxgait.champion import codec_of, read_champion
+from mjxgait.champion import read_champion, serializer_of
 from mjxgait.controllers.expressions.config import ProgramConfig
 from mjxgait.controllers.expressions.operators import Trees
 from mjxgait.controllers.expressions.text import EMPTY
@@ -134,7 +134,7 @@ def test_inspect_tells_how_many_nodes_matter(run: mjxgait.Run, capsys: pytest.Ca
     """Those that are left in the champion's file, which is simplified."""
     snapshot = read_snapshot(run.folder)
     told = facts(snapshot)["champion"]
-    settled = codec_of("program").settled(
+    settled = serializer_of("program").settled(
         {name: array[0] for name, array in snapshot.genomes.items()}, snapshot.creature
     )
     assert told["nodes_that_matter"] == (settled["code"] != EMPTY).sum(1).tolist()

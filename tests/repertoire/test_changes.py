@@ -19,7 +19,7 @@ from mjxgait.experiments.repertoire.neighbours import (
     succeeds,
     told_headings,
 )
-from mjxgait.reference.changing import ChangingTwin
+from mjxgait.reference.changing import ChangingReference
 from mjxgait.reference.outcome import Trajectory
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.walk import record_walk
@@ -30,7 +30,7 @@ CHANGES = np.array([1.0, 1.5, np.inf])
 
 def film(creature: Creature, before: Champion, after: Champion, seconds: float = 3.0) -> Trajectory:
     step = creature.model.opt.timestep
-    twin = ChangingTwin(creature, before, after, step, CHANGES, SECONDS)
+    twin = ChangingReference(creature, before, after, step, CHANGES, SECONDS)
     starts = nominal_starts(creature, len(CHANGES))
     count = len(CHANGES)
     return simulate(

@@ -17,16 +17,16 @@ from repertoire.made_up import CERTIFIED, GENERATIONS, begin, examine
 from viewing.made_up import treading
 
 from mjxgait.creature import Creature
-from mjxgait.distributed.scheduler import Crew
+from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.experiments.repertoire.grid import POSES, Cell, Grid, evolve, mirrored
 from mjxgait.experiments.repertoire.neighbours import half_way
 from mjxgait.training.folder import METRICS, read_metrics
 from mjxgait.training.stored import read_stored, stored_generations
 
 
-def run(folder: Path, creature: Creature, grid: Grid, kind: type[Crew] = Crew) -> bool:
-    crew = kind(Pretend())
-    return evolve(folder, creature, grid, crew, lambda *told: None, lambda: False)
+def run(folder: Path, creature: Creature, grid: Grid, kind: type[Scheduler] = Scheduler) -> bool:
+    scheduler = kind(Pretend())
+    return evolve(folder, creature, grid, scheduler, lambda *told: None, lambda: False)
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from mjxgait.experiments.repertoire.clips import (
 )
 from mjxgait.experiments.repertoire.found import Found
 from mjxgait.experiments.repertoire.grid import Cell
-from mjxgait.reference.changing import HaltingTwin
+from mjxgait.reference.changing import HaltingReference
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.walk import Walk, record_walk
 
@@ -103,7 +103,7 @@ def root_of(document: gltf.GLTF2, number: int) -> np.ndarray:
 def test_who_is_told_to_stop_walks_until_then_and_stands_after(walk: Walk):
     """Each of several simulations at its own moment."""
     stool, halts = walk.creature, np.array([1.0, 1.5, np.inf])
-    twin = HaltingTwin(stool, walk.champion, walk.time_step, halts, np.full(3, 0.2))
+    twin = HaltingReference(stool, walk.champion, walk.time_step, halts, np.full(3, 0.2))
     film = simulate(
         stool, walk.champion, nominal_starts(stool, 3), 3.0, record=3, threads=1, twin=twin
     ).trajectory

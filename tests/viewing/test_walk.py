@@ -15,9 +15,9 @@ def test_steady_strides_are_as_long_as_the_clock_says(stool_walk):
 
 def test_targets_are_those_of_the_examiner(stool_walk):
     """Without steering and balance the target is the planned pose."""
-    from mjxgait.controllers.key_poses.reference import PoseTwin
+    from mjxgait.controllers.key_poses.reference import PoseReference
 
-    twin = PoseTwin(stool_walk.creature, stool_walk.champion, stool_walk.time_step)
+    twin = PoseReference(stool_walk.creature, stool_walk.champion, stool_walk.time_step)
     positions = np.round(stool_walk.trajectory.phase[0] * twin.length).astype(int)
     np.testing.assert_allclose(stool_walk.trajectory.target[0], twin.planned(positions))
 

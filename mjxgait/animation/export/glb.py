@@ -27,7 +27,7 @@ from mjxgait.animation.export.skeleton import (
     world_poses,
 )
 from mjxgait.animation.export.surface import Piece, along_limbs, linear, pieces_of
-from mjxgait.champion.serializers import codec_of
+from mjxgait.champion.serializers import serializer_of
 from mjxgait.errors import UserError
 from mjxgait.files import write_bytes
 
@@ -45,7 +45,7 @@ def note_of(loop: WalkLoop) -> dict[str, str]:
         name: [round(float(v), 5) for v in _stride(loop, loop.qpos[:, place])]
         for name, place in zip(joints.names, joints.qpos, strict=True)
     }
-    known = codec_of("poses").document(champion.genome, champion.settings, creature)
+    known = serializer_of("poses").document(champion.genome, champion.settings, creature)
     document = {
         "creature": champion.digest,
         "advance": champion.settings.advance,

@@ -7,8 +7,8 @@ KINDS = (
         name="program",
         home=__name__,
         controller="controller:Programs",
-        reference="reference:ProgramTwin",
-        serializer="serialize:ProgramCodec",
+        reference="reference:ExpressionReference",
+        serializer="serialize:ExpressionSerializer",
         report="report:ProgramView",
     ),
 )

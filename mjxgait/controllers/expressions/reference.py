@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mjxgait.champion import Champion, codec_of
+from mjxgait.champion import Champion, serializer_of
 from mjxgait.creature import Creature
 from mjxgait.reference.controllers import Command, Memory
 
@@ -95,13 +95,13 @@ def value_of(expression: Expression, senses: Mapping[str, np.ndarray]) -> np.nda
     return np.minimum(np.maximum(value, -MOST), MOST)
 
 
-class ProgramTwin:
-    """See `Twin`. Its memory holds only the number of simulations."""
+class ExpressionReference:
+    """See `ReferenceController`. Its memory holds only the number of simulations."""
 
     command: ClassVar[Command] = "pose"
 
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
-        document = codec_of("program").document(champion.genome, champion.settings, creature)
+        document = serializer_of("program").document(champion.genome, champion.settings, creature)
         texts = document["expressions"]
         self.creature, self.every = creature, int(champion.settings.every)
         self.expressions = [read(texts[joint]) for joint in creature.joints.names]
@@ -110,11 +110,11 @@ class ProgramTwin:
         self.reads = tuple(sorted({"time", *(sense_of(name)[0] for name in names)}))
 
     def init(self, count: int) -> Memory:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         return {"still": np.zeros(count)}
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         count = len(senses["time"])
         rows = [np.broadcast_to(value_of(e, senses), count) for e in self.expressions]
         angles = np.stack(rows, axis=1)
@@ -123,5 +123,5 @@ class ProgramTwin:
         ), memory
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `Twin`: it has no cycle."""
+        """See `ReferenceController`: it has no cycle."""
         return np.full(len(memory["still"]), np.nan)

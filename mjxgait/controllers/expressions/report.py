@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Console
 from typing_extensions import override
 
-from mjxgait.champion import codec_of
+from mjxgait.champion import serializer_of
 from mjxgait.controllers.expressions.text import (
     ADDED,
     EMPTY,
@@ -85,7 +85,7 @@ def _texts(snapshot: Snapshot, i: int) -> dict[str, str]:
 def _mattering(snapshot: Snapshot, i: int) -> list[int]:
     """Return the number of nodes [J] left in each expression after simplification."""
     genome = {name: array[i] for name, array in snapshot.genomes.items()}
-    settled = codec_of("program").settled(genome, snapshot.creature)
+    settled = serializer_of("program").settled(genome, snapshot.creature)
     return [int(count) for count in (settled["code"] != EMPTY).sum(axis=1)]
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from mjxgait.champion.serializers import PlainCodec
+from mjxgait.champion.serializers import PlainSerializer
 from mjxgait.config.tables import build
 from mjxgait.controllers.expressions.config import MOST_NODES, ProgramConfig
 from mjxgait.controllers.expressions.parse import (
@@ -29,13 +29,13 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 
 
-class ProgramCodec(PlainCodec):
-    """Serializer for genomes with `code` and `value` [J, C]; see `Codec`."""
+class ExpressionSerializer(PlainSerializer):
+    """Serializer for genomes with `code` and `value` [J, C]; see `Serializer`."""
 
     def document(
         self, genome: Mapping[str, np.ndarray], settings: ProgramConfig, creature: Creature
     ) -> dict[str, Any]:
-        """See `Codec`. expressions: by joint. nodes: most per expression."""
+        """See `Serializer`. expressions: by joint. nodes: most per expression."""
         known = terminals(creature, tuple(ADDED.values()))
         rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
         return {
@@ -46,7 +46,7 @@ class ProgramCodec(PlainCodec):
     def settled(
         self, genome: Mapping[str, np.ndarray], creature: Creature
     ) -> dict[str, np.ndarray]:
-        """See `Codec`: simplified, then written as text and read back."""
+        """See `Serializer`: simplified, then written as text and read back."""
         known, nodes = terminals(creature, tuple(ADDED.values())), genome["code"].shape[1]
         pairs = zip(genome["code"], genome["value"], strict=True)
         rows = []

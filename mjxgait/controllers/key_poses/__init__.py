@@ -7,8 +7,8 @@ KINDS = (
         name="poses",
         home=__name__,
         controller="controller:PoseTracker",
-        reference="reference:PoseTwin",
-        serializer="serialize:PoseCodec",
+        reference="reference:PoseReference",
+        serializer="serialize:PoseSerializer",
         report="report:PoseView",
     ),
 )

@@ -18,7 +18,7 @@ READS = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_r
 STEP_READS = ("foot_height", "foot_place", "nose_vel")
 
 
-class PoseTwin:
+class PoseReference:
     """Reference controller of a pose cycle. Memory: `position` [S] in the cycle, `steps` [S]."""
 
     command: ClassVar[Command] = "pose"
@@ -34,15 +34,15 @@ class PoseTwin:
         self.length = len(self.cycle) * champion.settings.interpolation
 
     def init(self, count: int) -> Memory:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         return {name: np.zeros(count, dtype=int) for name in ("position", "steps")}
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         return memory["position"] / self.length
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         target = self.target(memory["position"], senses, memory["steps"])
         steps = memory["steps"] + 1
         position = self.advance(memory["position"], target, senses["joint_pos"], steps)

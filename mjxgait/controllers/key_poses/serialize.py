@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from mjxgait.champion.serializers import PlainCodec
+from mjxgait.champion.serializers import PlainSerializer
 from mjxgait.config.tables import build
 from mjxgait.controllers.key_poses.config import PoseConfig, gene_names
 from mjxgait.creature import Creature
@@ -18,13 +18,13 @@ LATER = {"begin": 0.0, "turn": 0.0}
 """Genes added later, with the values that reproduce older files."""
 
 
-class PoseCodec(PlainCodec):
+class PoseSerializer(PlainSerializer):
     """Serializer for `key_poses` [K, J] in rad and `tuning` [E] in the order of `gene_names`."""
 
     def document(
         self, genome: Mapping[str, np.ndarray], settings: PoseConfig, creature: Creature
     ) -> dict[str, Any]:
-        """See `Codec`. mirrored: whether the cycle includes the mirror images of the poses."""
+        """See `Serializer`. mirrored: whether the cycle includes the mirror images of the poses."""
         names = gene_names(creature.corrections.steps)
         return {
             "key_poses": [

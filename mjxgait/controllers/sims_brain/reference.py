@@ -84,8 +84,8 @@ def fire(kind: str, inputs: Sequence[Values], memory: Values, dt: float) -> tupl
     return np.clip(output, -MOST, MOST), np.clip(kept, -MOST, MOST)
 
 
-class BrainTwin:
-    """See `Twin`.
+class BrainReference:
+    """See `ReferenceController`.
 
     genome: its arrays by name. parts: grown from it. hinges: part and hinge index of each joint of
     the model. step: s of the simulation. every: steps per command.
@@ -125,13 +125,13 @@ class BrainTwin:
         self.strength = np.array([strength for _, _, strength in pulls])
 
     def init(self, count: int) -> Memory:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         shape = (count, len(self.place))
         # Two arrays, since callers write into each.
         return {"values": np.zeros(shape), "memory": np.zeros(shape)}
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
-        """See `Twin`."""
+        """See `ReferenceController`."""
         values, kept, dt = memory["values"], memory["memory"], self.pause / TICKS
         sensed = self._sensed(senses)
         for _ in range(TICKS):
@@ -146,7 +146,7 @@ class BrainTwin:
         return torque, {"values": values, "memory": kept}
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `Twin`: it has no cycle."""
+        """See `ReferenceController`: it has no cycle."""
         return np.full(len(memory["values"]), np.nan)
 
     def _sensed(self, senses: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -211,9 +211,9 @@ def _sign(part: Part, hinge: int) -> float:
     return -1.0 if part.mirrored and part.hinges[hinge] != 1 else 1.0
 
 
-def brain_twin(creature: Creature, champion: Champion, step: float) -> BrainTwin:
+def brain_reference(creature: Creature, champion: Champion, step: float) -> BrainReference:
     """Return the brain of a champion; its grown creature names its hinges like `part3_0`."""
     parts = grow(champion.genome, champion.settings.parts, champion.settings.links)
     names = [name.removeprefix("part").split("_") for name in creature.joints.names]
     hinges = [(int(part), int(hinge)) for part, hinge in names]
-    return BrainTwin(champion.genome, parts, hinges, step, champion.settings.every)
+    return BrainReference(champion.genome, parts, hinges, step, champion.settings.every)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from mjxgait.champion.serializers import Codec
+from mjxgait.champion.serializers import Serializer
 from mjxgait.config.tables import build
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.reference_body import FRICTION, GRAVITY, grow
@@ -17,13 +17,13 @@ from mjxgait.errors import UserError
 from mjxgait.kinds import in_water
 
 
-class GraphCodec(Codec):
-    """See `Codec`: arrays as nested lists under their names."""
+class GraphSerializer(Serializer):
+    """See `Serializer`: arrays as nested lists under their names."""
 
     def settled(
         self, genome: Mapping[str, np.ndarray], creature: Creature
     ) -> dict[str, np.ndarray]:
-        """See `Codec`: numbers as stored in a file, so that the same body grows from it."""
+        """See `Serializer`: numbers as stored in a file, so that the same body grows from it."""
         return {
             name: array.astype(float) if np.issubdtype(array.dtype, np.floating) else array
             for name, array in genome.items()
@@ -64,7 +64,7 @@ class GraphCodec(Codec):
         task: str,
         creature: Creature,
     ) -> Creature:
-        """See `Codec`: the grown body, in the water or on the ground of its task."""
+        """See `Serializer`: the grown body, in the water or on the ground of its task."""
         wet = in_water(task)
         files = body_files(
             grow(genome, settings.parts, settings.links),

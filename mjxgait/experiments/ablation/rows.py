@@ -17,7 +17,7 @@ import jax
 import numpy as np
 
 from mjxgait.certification import certify
-from mjxgait.certification.acceptance import demands_of
+from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion, read_champion, write_champion
@@ -25,7 +25,7 @@ from mjxgait.config.traced import traced
 from mjxgait.creature import Creature, load_creature
 from mjxgait.distributed.jobs import Advanced, AdvanceRows, Job
 from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.scheduler import Crew
+from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.experiments.ablation.plan import Plan, Run, Study
 from mjxgait.plugins.user_code import load_all, loaded
 from mjxgait.processes import process_per_core, survivable
@@ -69,7 +69,7 @@ def run_study(
     creature: Creature,
     plan: Plan,
     tell: Progress,
-    crew: Crew,
+    scheduler: Scheduler,
     stride: int = 1,
 ) -> bool:
     """Run or resume all groups; return whether all were completed.
@@ -87,14 +87,14 @@ def run_study(
     with interruptible() as interrupted, contextlib.ExitStack() as at_last:
         for number, group in left.items():
             at_last.callback(group.close)
-            crew.submit(number, partial(group.work, partial(tell, number, len(parts))))
-        while left and (done := crew.next(interrupted.is_set)):
+            scheduler.submit(number, partial(group.work, partial(tell, number, len(parts))))
+        while left and (done := scheduler.next(interrupted.is_set)):
             number, advanced = cast(tuple[int, Advanced], done)
             group = left[number]
             group.keep(advanced)
             tell(number, len(parts), group.news(advanced))
             if group.generation < group.last:
-                crew.submit(number, group.work, first=True)
+                scheduler.submit(number, group.work, first=True)
             else:
                 left.pop(number).close()
     return not left
@@ -342,14 +342,14 @@ def walked(creature: Creature, champion: Champion) -> tuple[float, float, float]
     Speeds are in body lengths per second; the nominal one is 0 after a fall.
     """
     config, rng = CertificateConfig(), np.random.default_rng(SEED)
-    demands = demands_of(champion.task, champion.wish)
-    unseen = demands.aimed(perturbed_starts(creature, STARTS, rng), config, rng)
-    starts = demands.aimed(join(nominal_starts(creature, 1), unseen), config)
-    fall = demands.fall(config)
+    acceptance = acceptance_of(champion.task, champion.wish)
+    unseen = acceptance.aimed(perturbed_starts(creature, STARTS, rng), config, rng)
+    starts = acceptance.aimed(join(nominal_starts(creature, 1), unseen), config)
+    fall = acceptance.fall(config)
     outcome = simulate(creature, champion, starts, SECONDS, fall=fall, threads=1)
     speed = outcome.travel[:, 0] / creature.frame.body_length / SECONDS
     return (
         float(speed[1:].mean()),
-        float(demands.succeeded(outcome, starts, config)[1:].mean()),
+        float(acceptance.succeeded(outcome, starts, config)[1:].mean()),
         float(speed[0] * outcome.stayed_up[0]),
     )

@@ -26,7 +26,7 @@ from mjxgait.experiments.repertoire.found import Found, found_in
 from mjxgait.experiments.repertoire.grid import Grid
 from mjxgait.experiments.repertoire.neighbours import Blend, Change
 from mjxgait.files import read_json, write_bytes, write_text
-from mjxgait.reference.changing import HaltingTwin
+from mjxgait.reference.changing import HaltingReference
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.video import LOOP_SECONDS, champion_of
 from mjxgait.rendering.walk import WARMUP, Walk
@@ -135,7 +135,7 @@ def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
     """
     creature, step = walk.creature, walk.time_step
     halts, fades = (each.ravel() for each in np.meshgrid(moments, FADES))
-    twin = HaltingTwin(creature, walk.champion, step, halts, fades)
+    twin = HaltingReference(creature, walk.champion, step, halts, fades)
     starts, seconds = nominal_starts(creature, len(halts)), float(moments[-1]) + SETTLES
     outcome = simulate(
         creature, walk.champion, starts, seconds, record=len(halts), threads=1, twin=twin

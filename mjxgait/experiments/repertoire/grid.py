@@ -16,7 +16,7 @@ from mjxgait.config.tables import STRICT, build, dump_toml, read_toml
 from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import Advanced
 from mjxgait.distributed.rows import Rows
-from mjxgait.distributed.scheduler import Crew
+from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
 from mjxgait.tasks.walk.targets import Wishes, wished
 from mjxgait.training.checkpoint import Packed
@@ -185,7 +185,7 @@ def evolve(
     folder: Path,
     creature: Creature,
     grid: Grid,
-    crew: Crew,
+    scheduler: Scheduler,
     tell: Tell,
     stopped: Callable[[], bool],
 ) -> bool:
@@ -194,13 +194,13 @@ def evolve(
     both = not has_mirror(creature)
     turning = [cell for cell in grid.cells if cell.turn > 0 or (cell.turn and both)]
     first = _side(folder, creature, grid, straight)
-    found = first.to_the_end(None, crew, partial(tell, "straight on"), stopped)
+    found = first.to_the_end(None, scheduler, partial(tell, "straight on"), stopped)
     if found is None or not turning:
         return found is not None
     by_speed = {cell.speed: found.row(row) for row, cell in enumerate(straight)}
     begin = planted(turning, by_speed)
     second = _side(folder, creature, grid, turning)
-    return second.to_the_end(begin, crew, partial(tell, "turning"), stopped) is not None
+    return second.to_the_end(begin, scheduler, partial(tell, "turning"), stopped) is not None
 
 
 def _side(folder: Path, creature: Creature, grid: Grid, cells: Sequence[Cell]) -> Rows:

@@ -14,14 +14,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mjxgait.certification import CertificateConfig, glance
+from mjxgait.certification import CertificateConfig, nominal_check
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.experiments.repertoire.found import Found
 from mjxgait.experiments.repertoire.grid import Cell, Grid, has_mirror, mirrored
 from mjxgait.processes import one_per_core
-from mjxgait.reference.changing import ChangingTwin
+from mjxgait.reference.changing import ChangingReference
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.walk import WARMUP
@@ -100,7 +100,7 @@ def blends(
 def _blended(folder: Path, pair: Pair) -> Blend:
     """Test a pair in its own process, which receives only the walks' place."""
     (creature, one), (_, other) = (open_champion(folder / cell.name) for cell in pair)
-    seen = glance(creature, half_way(one, other, creature))
+    seen = nominal_check(creature, half_way(one, other, creature))
     judged = [criterion for criterion in seen.criteria if criterion.number in WALKS]
     return Blend(pair, tuple(criterion.name for criterion in judged if not criterion.passed))
 
@@ -185,7 +185,7 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
     moments = WARMUP + np.arange(MOMENTS) / MOMENTS
     steps = round((moments[-1] + SECONDS + SETTLES + WATCHED) / step)
     told = told_headings(before, after, moments, steps, step)
-    twin = ChangingTwin(creature, before, after, step, moments, SECONDS)
+    twin = ChangingReference(creature, before, after, step, moments, SECONDS)
     outcome = simulate(
         creature,
         after,

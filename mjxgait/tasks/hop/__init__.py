@@ -3,19 +3,19 @@
 from mjxgait.kinds import TaskKind
 
 KINDS = (
-    TaskKind("hop", __name__, task="task:Hop", criteria="criteria:HopDemands", tables=("hop",)),
+    TaskKind("hop", __name__, task="task:Hop", criteria="criteria:HopCriteria", tables=("hop",)),
     TaskKind(
         "limbo",
         __name__,
         task="limbo:Limbo",
-        criteria="criteria:LimboDemands",
+        criteria="criteria:LimboCriteria",
         tables=("limbo",),
     ),
     TaskKind(
         "travel",
         __name__,
         task="task:Travel",
-        criteria="criteria:TravelDemands",
+        criteria="criteria:TravelCriteria",
         tables=("travel",),
     ),
 )

@@ -23,8 +23,8 @@ HIGHEST = 1e3
 """Height limit in standing heights: a hopping trunk may be anywhere, but no part may lie."""
 
 
-class GoalDemands(Unasked, abc.ABC):
-    """See `Demands`. Pushes decide nothing: in half of a hop the body cannot react."""
+class GoalCriteria(Unasked, abc.ABC):
+    """See `AcceptanceCriteria`. Pushes decide nothing: in half of a hop the body cannot react."""
 
     drag: float = 0.0
     pushed: bool = True
@@ -44,13 +44,13 @@ class GoalDemands(Unasked, abc.ABC):
         """Criterion 2: progress on the way."""
 
     def fall(self, config: CertificateConfig) -> Fall:
-        """See `Demands`: a head or an elbow on the floor, or a base on its edge."""
+        """See `AcceptanceCriteria`: a head or an elbow on the floor, or a base on its edge."""
         return Fall(min_up=self.wanted(config).min_up, height=(0.0, HIGHEST), touch=True)
 
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `Demands`: a goal for each simulation without one."""
+        """See `AcceptanceCriteria`: a goal for each simulation without one."""
         wanted = self.wanted(config)
         drawn = wanted.nominal if rng is None else rng.uniform(*wanted.goals, len(starts))
         return dataclasses.replace(starts, goal=np.where(starts.goal > 0, starts.goal, drawn))
@@ -58,7 +58,7 @@ class GoalDemands(Unasked, abc.ABC):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 1 and 2, both at half the time step too, 8, 9; without a warm-up."""
+        """See `AcceptanceCriteria`: 1 and 2, both at half the time step too, 8, 9; without a warm-up."""
         basic, repeated = (self.basic(each, config) for each in (whole, halved))
         failed = sum(not m.passed for c in repeated for m in c.measures)
         of = " and ".join(str(c.number) for c in basic)
@@ -72,17 +72,17 @@ class GoalDemands(Unasked, abc.ABC):
     def kept(
         self, champion: Champion, whole: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: evolution has promised nothing."""
+        """See `AcceptanceCriteria`: evolution has promised nothing."""
         return ()
 
     def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """See `Demands`: the same."""
+        """See `AcceptanceCriteria`: the same."""
         return goal
 
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 4. The effect of pushes is only reported."""
+        """See `AcceptanceCriteria`: 4. The effect of pushes is only reported."""
         share = at_least(self.share, started, self.wanted(config).arrive, 1.0)
         return (Criterion(4, "perturbed starts and other goals", (share,)),)
 
@@ -93,8 +93,8 @@ class GoalDemands(Unasked, abc.ABC):
         return (Criterion(1, "stays up", (up, lies)), self.second(whole, config))
 
 
-class HopDemands(GoalDemands):
-    """See `Demands`.
+class HopCriteria(GoalCriteria):
+    """See `AcceptanceCriteria`.
 
     worth: not all trials, because an episode is shorter than the certification, and a slow hopper
       may still reach a far goal in time.
@@ -109,14 +109,14 @@ class HopDemands(GoalDemands):
         return config.hop
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that stayed up, arrived, and stayed there."""
+        """See `AcceptanceCriteria`: those that stayed up, arrived, and stayed there."""
         wanted = self.wanted(config)
         frames = frames_in(wanted.stay, outcome.trajectory.time_step)
         left = away(starts.goal[:, None], outcome.path, outcome.aside)
         return outcome.stayed_up & (farthest(left, starts.goal, frames) <= wanted.near)
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `Demands`: down, or away from the goal at a time that counts."""
+        """See `AcceptanceCriteria`: down, or away from the goal at a time that counts."""
         wanted = self.wanted(CertificateConfig())
         frames = frames_in(wanted.stay, outcome.trajectory.time_step)
         due = slice(outcome.path.shape[1] - frames, steps)
@@ -125,7 +125,7 @@ class HopDemands(GoalDemands):
         return super().lost(outcome, starts, steps) | outside.any(1)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`: distance from the goal at the end, and time of the final arrival."""
+        """See `AcceptanceCriteria`: distance from the goal at the end, and time of the final arrival."""
         left = _left(whole)
         outside = np.flatnonzero(~(left <= self.wanted(config).near * whole.goal))
         begins = outside[-1] + 1 if len(outside) else 0
@@ -140,7 +140,7 @@ class HopDemands(GoalDemands):
         }
 
     def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
-        """See `GoalDemands`: it arrives and stays."""
+        """See `GoalCriteria`: it arrives and stays."""
         wanted = self.wanted(config)
         frames = frames_in(wanted.stay, whole.time_step)
         left = farthest(_left(whole)[None], np.array([whole.goal]), frames)[0]
@@ -150,7 +150,7 @@ class HopDemands(GoalDemands):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: no early end, and near the goal at the end."""
+        """See `AcceptanceCriteria`: no early end, and near the goal at the end."""
         near: np.ndarray = outcome["off"] <= self.wanted(CertificateConfig()).near
         return to_the_end(outcome, seconds, creature) & near
 
@@ -190,8 +190,8 @@ ENOUGH = 0.01
 """m; more clearance is no better."""
 
 
-class LimboDemands(HopDemands):
-    """See `Demands`. Goals lie beyond the bar, so arrival implies passing it."""
+class LimboCriteria(HopCriteria):
+    """See `AcceptanceCriteria`. Goals lie beyond the bar, so arrival implies passing it."""
 
     verdict = "it gets to its goal beneath the bar and stays"
 
@@ -202,29 +202,29 @@ class LimboDemands(HopDemands):
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `Demands`: a goal and a bar for each simulation without one."""
+        """See `AcceptanceCriteria`: a goal and a bar for each simulation without one."""
         bar = np.array([config.limbo.place, config.limbo.height])
         given = np.where(np.isfinite(starts.bar), starts.bar, bar)
         return dataclasses.replace(super().aimed(starts, config, rng), bar=given)
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that stayed up and clear, arrived, and stayed there."""
+        """See `AcceptanceCriteria`: those that stayed up and clear, arrived, and stayed there."""
         clear: np.ndarray = outcome.clearance > config.limbo.clearance
         return super().succeeded(outcome, starts, config) & clear
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `Demands`: as for hopping, and any contact with the bar."""
+        """See `AcceptanceCriteria`: as for hopping, and any contact with the bar."""
         touched = outcome.clearance <= CertificateConfig().limbo.clearance
         return super().lost(outcome, starts, steps) | touched
 
     def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `GoalDemands`: 1, 2 and 3."""
+        """See `GoalCriteria`: 1, 2 and 3."""
         least, room = _least(whole), config.limbo.clearance
         clear = at_least("least clearance (m)", least, room, room + ENOUGH)
         return (*super().basic(whole, config), Criterion(3, "clear of the bar", (clear,)))
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`: as for hopping, and the least clearance."""
+        """See `AcceptanceCriteria`: as for hopping, and the least clearance."""
         told = super().report(whole, config)
         least = _least(whole)
         bar = f"a bar {config.limbo.height:g} m high {'cleared' if least > 0 else 'touched'}"
@@ -233,7 +233,7 @@ class LimboDemands(HopDemands):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: as for hopping, and clear of the bar of the certification.
+        """See `AcceptanceCriteria`: as for hopping, and clear of the bar of the certification.
 
         The bar in evolution may be lower.
         """
@@ -250,8 +250,8 @@ NEAR = 0.05
 """Share of the goal spacing within which a goal counts as reached (docs/reference/hop.md)."""
 
 
-class TravelDemands(GoalDemands):
-    """See `Demands`. A goal that is near, or passed, moves on by its first distance."""
+class TravelCriteria(GoalCriteria):
+    """See `AcceptanceCriteria`. A goal that is near, or passed, moves on by its first distance."""
 
     verdict = "it travels from goal to goal"
     share = "share that travels"
@@ -268,12 +268,12 @@ class TravelDemands(GoalDemands):
         return np.where(reached, goal + first, goal)
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that stayed up and were fast enough."""
+        """See `AcceptanceCriteria`: those that stayed up and were fast enough."""
         seconds = outcome.path.shape[1] * outcome.trajectory.time_step
         return outcome.stayed_up & (outcome.path[:, -1] >= config.travel.speed * seconds)
 
     def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
-        """See `GoalDemands`: fast enough, and not much slower in the second half."""
+        """See `GoalCriteria`: fast enough, and not much slower in the second half."""
         wanted = config.travel
         way = whole.trunk_pos[:, 0]
         half, seconds = len(way) // 2, len(way) * whole.time_step
@@ -290,12 +290,12 @@ class TravelDemands(GoalDemands):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: as for all tasks with a goal, and 7: no motion by vibration."""
+        """See `AcceptanceCriteria`: as for all tasks with a goal, and 7: no motion by vibration."""
         shakes = at_most("buzz of a joint / joint speed", buzz(whole), config.gait.buzz)
         return (*super().undisturbed(whole, halved, config), Criterion(7, "gait", (shakes,)))
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`: distance travelled, and number of goals."""
+        """See `AcceptanceCriteria`: distance travelled, and number of goals."""
         way, goal, goals = whole.trunk_pos[:, 0], np.array(whole.goal), 0
         for place in np.maximum.accumulate(way):
             ahead = self.onward(goal, np.array(whole.goal), place)
@@ -312,6 +312,6 @@ class TravelDemands(GoalDemands):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: no early end, and fast enough."""
+        """See `AcceptanceCriteria`: no early end, and fast enough."""
         fast: np.ndarray = outcome["way"] >= CertificateConfig().travel.speed * seconds
         return to_the_end(outcome, seconds, creature) & fast

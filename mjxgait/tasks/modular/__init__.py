@@ -6,15 +6,15 @@ from mjxgait.kinds import TaskKind
 
 _kind = partial(TaskKind, home=__name__, modular=True)
 KINDS = (
-    _kind("swim", task="task:Swim", criteria="criteria:SwimDemands", water=True, tables=("swim",)),
+    _kind("swim", task="task:Swim", criteria="criteria:SwimCriteria", water=True, tables=("swim",)),
     _kind(
         "roam",
         task="task:Roam",
-        criteria="criteria:RoamDemands",
+        criteria="criteria:RoamCriteria",
         called="walk",
         tables=("roam",),
     ),
-    _kind("jump", task="task:Jump", criteria="criteria:JumpDemands", tables=("jump",)),
+    _kind("jump", task="task:Jump", criteria="criteria:JumpCriteria", tables=("jump",)),
     _kind(
         "follow",
         task="follow:FollowInWater",

@@ -41,8 +41,8 @@ from mjxgait.tasks.modular.thresholds import (
 UNITS = {"speed": "m/s", "height": "m"}
 
 
-class BlocksDemands(StaysUp, abc.ABC):
-    """See `Demands`. These bodies have no upright pose, so there are no falls and no pushes."""
+class ModularCriteria(StaysUp, abc.ABC):
+    """See `AcceptanceCriteria`. These bodies have no upright pose, so there are no falls and no pushes."""
 
     pushed = by_pushes = False
     grown = True
@@ -82,7 +82,7 @@ class BlocksDemands(StaysUp, abc.ABC):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: no early end, and clearly more than required."""
+        """See `AcceptanceCriteria`: no early end, and clearly more than required."""
         lived = to_the_end(outcome, seconds, creature)
         enough: np.ndarray = outcome[self.evidence] >= self.enough(seconds, CertificateConfig())
         return lived & enough
@@ -92,13 +92,13 @@ class BlocksDemands(StaysUp, abc.ABC):
         return ()
 
     def fall(self, config: CertificateConfig) -> Fall:
-        """See `Demands`: never."""
+        """See `AcceptanceCriteria`: never."""
         return Fall(min_up=-2.0, height=(-np.inf, np.inf), touch=False)
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 2, 6, 8, 9, and the task's own."""
+        """See `AcceptanceCriteria`: 2, 6, 8, 9, and the task's own."""
         window, other = whole.window(config.warmup), halved.window(config.warmup)
         does, repeated = (self.second(each, config) for each in (window, other))
         failed = sum(not m.passed for m in repeated.measures)
@@ -135,12 +135,12 @@ class BlocksDemands(StaysUp, abc.ABC):
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 4."""
+        """See `AcceptanceCriteria`: 4."""
         share = at_least(f"share that {self.verb}", started, self.wanted(config).arrive, 1.0)
         return (Criterion(4, "perturbed starts", (share,)),)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`: the performance, and the body."""
+        """See `AcceptanceCriteria`: the performance, and the body."""
         window = whole.window(config.warmup)
         done, parts, unit = self.done(window), len(seen(whole).sizes), UNITS[self.promised]
         return {
@@ -152,8 +152,8 @@ class BlocksDemands(StaysUp, abc.ABC):
         }
 
 
-class GoingDemands(BlocksDemands):
-    """See `BlocksDemands`: motion in a straight line at a speed."""
+class GoingCriteria(ModularCriteria):
+    """See `ModularCriteria`: motion in a straight line at a speed."""
 
     promised = "speed"
     axes = 3
@@ -168,17 +168,17 @@ class GoingDemands(BlocksDemands):
         return gets_on(self.verb, self._middle(window), window.time_step, self.wanted(config))
 
     def done(self, window: Recording) -> float:
-        """See `BlocksDemands`: m/s."""
+        """See `ModularCriteria`: m/s."""
         return float(flight(self._middle(window), window.time_step))
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those as fast as criterion 2 requires, measured in the same way."""
+        """See `AcceptanceCriteria`: those as fast as criterion 2 requires, measured in the same way."""
         middle = counted(outcome.middle, outcome, config)[..., : self.axes]
         fast = flight(middle, outcome.trajectory.time_step) >= self.wanted(config).speed
         return outcome.stayed_up & fast
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: the distance in m due in all seconds, within those that count."""
+        """See `ModularCriteria`: the distance in m due in all seconds, within those that count."""
         return self.wanted(config).speed * seconds
 
     def _middle(self, window: Recording) -> np.ndarray:
@@ -259,8 +259,8 @@ def seen(recording: Recording) -> Grown:
     return recording.grown
 
 
-class SwimDemands(GoingDemands):
-    """See `Demands`. In water there is no up."""
+class SwimCriteria(GoingCriteria):
+    """See `AcceptanceCriteria`. In water there is no up."""
 
     verdict = "it swims"
     verb = "swims"
@@ -271,7 +271,7 @@ class SwimDemands(GoingDemands):
         return config.swim
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `GoingDemands`: 11, the source of the momentum."""
+        """See `GoingCriteria`: 11, the source of the momentum."""
         return (by_water(window, config.swim),)
 
 
@@ -286,8 +286,8 @@ def by_water(window: Recording, config: SwimConfig) -> Criterion:
     return Criterion(11, "by water alone", (measure,))
 
 
-class RoamDemands(GoingDemands):
-    """See `Demands`. Only level distance counts: leaping up gains nothing."""
+class RoamCriteria(GoingCriteria):
+    """See `AcceptanceCriteria`. Only level distance counts: leaping up gains nothing."""
 
     verdict = "it walks"
     verb = "walks"
@@ -298,7 +298,7 @@ class RoamDemands(GoingDemands):
         return config.roam
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `GoingDemands`: 1, the side that was up after settling stays up."""
+        """See `GoingCriteria`: 1, the side that was up after settling stays up."""
         return (balanced(window, config.roam),)
 
 
@@ -313,8 +313,8 @@ SPAN = 2.0
 """Length of a span in s; the body must jump in each. A single highest leap is chance."""
 
 
-class JumpDemands(BlocksDemands):
-    """See `Demands`: it jumps again and again, from perturbed starts too."""
+class JumpCriteria(ModularCriteria):
+    """See `AcceptanceCriteria`: it jumps again and again, from perturbed starts too."""
 
     verdict = "it jumps"
     verb = "jumps"
@@ -331,21 +331,21 @@ class JumpDemands(BlocksDemands):
         return Criterion(2, "jumps", (height,))
 
     def done(self, window: Recording) -> float:
-        """See `BlocksDemands`: m, of the lowest part at the best moment, mean of the spans."""
+        """See `ModularCriteria`: m, of the lowest part at the best moment, mean of the spans."""
         return float(np.mean(highest(seen(window).low, window.time_step)))
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: for the undisturbed trial, not for all."""
+        """See `ModularCriteria`: for the undisturbed trial, not for all."""
         return float(champion.origin.get("nominal", {}).get("height", np.nan))
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those with a high enough leap in the median span."""
+        """See `AcceptanceCriteria`: those with a high enough leap in the median span."""
         low = counted(outcome.low, outcome, config)
         middling = np.median(highest(low, outcome.trajectory.time_step), axis=-1)
         return outcome.stayed_up & (middling >= config.jump.height)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: m, a quarter above the threshold."""
+        """See `ModularCriteria`: m, a quarter above the threshold."""
         return 1.25 * config.jump.height
 
 

@@ -12,12 +12,12 @@ from mjxgait.controllers.sims_brain.reference_body import DRAG, LIGHT
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import Starts
-from mjxgait.tasks.modular.criteria import BlocksDemands, balanced, by_water, counted, seen
+from mjxgait.tasks.modular.criteria import ModularCriteria, balanced, by_water, counted, seen
 from mjxgait.tasks.modular.thresholds import FollowConfig
 
 
-class FollowDemands(BlocksDemands):
-    """See `Demands`. drag: 0 on land."""
+class FollowCriteria(ModularCriteria):
+    """See `AcceptanceCriteria`. drag: 0 on land."""
 
     verdict = "it follows a light"
     verb = "follows"
@@ -37,19 +37,19 @@ class FollowDemands(BlocksDemands):
         return Criterion(2, "follows", (nearer,))
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `BlocksDemands`: the criterion of swimming or of walking."""
+        """See `ModularCriteria`: the criterion of swimming or of walking."""
         if self.drag:
             return (by_water(window, config.swim),)
         return (balanced(window, config.roam),)
 
     def done(self, window: Recording) -> float:
-        """See `BlocksDemands`: m/s of the approach."""
+        """See `ModularCriteria`: m/s of the approach."""
         assert window.light is not None
         apart = (seen(window).middle - window.light)[:, : self.axes]
         return float(approach(apart, window.time_step))
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: for the light of the recording, not for all."""
+        """See `ModularCriteria`: for the light of the recording, not for all."""
         way = champion.origin.get("nominal", {}).get("way", np.nan)
         return float(way / (seconds - self.since(champion, config)))
 
@@ -60,7 +60,7 @@ class FollowDemands(BlocksDemands):
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `Demands`: a light for each simulation without one, the nominal one ahead."""
+        """See `AcceptanceCriteria`: a light for each simulation without one, the nominal one ahead."""
         ahead = np.tile([1.0, 0.0, 0.0], (len(starts), 1))
         drawn = ahead if rng is None else rng.normal(size=(len(starts), 3))
         drawn[:, self.axes :] = 0.0
@@ -70,14 +70,14 @@ class FollowDemands(BlocksDemands):
         )
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that approach as fast as criterion 2 requires, measured alike."""
+        """See `AcceptanceCriteria`: those that approach as fast as criterion 2 requires, measured alike."""
         middle = counted(outcome.middle, outcome, config)
         apart = (middle - starts.light[:, None])[..., : self.axes]
         nearer = approach(apart, outcome.trajectory.time_step)
         return outcome.stayed_up & (nearer >= config.follow.speed)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: the approach in m due in all seconds, made in those that count."""
+        """See `ModularCriteria`: the approach in m due in all seconds, made in those that count."""
         return config.follow.speed * seconds
 
 
@@ -88,11 +88,11 @@ def approach(apart: np.ndarray, time_step: float) -> np.ndarray:
     return speed
 
 
-def in_water() -> FollowDemands:
+def in_water() -> FollowCriteria:
     """Return the criteria of a swimmer that follows a light."""
-    return FollowDemands(DRAG)
+    return FollowCriteria(DRAG)
 
 
-def on_land() -> FollowDemands:
+def on_land() -> FollowCriteria:
     """Return the criteria of a walker that follows a light."""
-    return FollowDemands(0.0)
+    return FollowCriteria(0.0)

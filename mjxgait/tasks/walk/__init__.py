@@ -2,4 +2,4 @@
 
 from mjxgait.kinds import TaskKind
 
-KINDS = (TaskKind("walk", __name__, task="task:Walk", criteria="criteria:WalkDemands"),)
+KINDS = (TaskKind("walk", __name__, task="task:Walk", criteria="criteria:WalkCriteria"),)

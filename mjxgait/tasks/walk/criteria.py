@@ -72,8 +72,8 @@ The range allows for standing at the start.
 """
 
 
-class WalkDemands(StaysUp):
-    """See `Demands`: steady forward strides, like those of an animal."""
+class WalkCriteria(StaysUp):
+    """See `AcceptanceCriteria`: steady forward strides, like those of an animal."""
 
     verdict = "it walks"
     revision = 1
@@ -83,8 +83,8 @@ class WalkDemands(StaysUp):
         self.wish = dict(wish or {})
 
     @override
-    def asked(self, wish: Mapping[str, Any]) -> "WalkDemands":
-        return WalkDemands(wish) if wish else self
+    def asked(self, wish: Mapping[str, Any]) -> "WalkCriteria":
+        return WalkCriteria(wish) if wish else self
 
     @override
     def told(self, steps: int, time_step: float) -> np.ndarray | None:
@@ -101,13 +101,13 @@ class WalkDemands(StaysUp):
     def obeyed(
         self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 11."""
+        """See `AcceptanceCriteria`: 11."""
         return (steered(outcome, told, config.wishes),)
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: all but 4 and 5, and 10 if targets are set."""
+        """See `AcceptanceCriteria`: all but 4 and 5, and 10 if targets are set."""
         config = following(config, self.wish, whole.dimensions)
         whole, halved = (unrolled(recording, self.wish) for recording in (whole, halved))
         window = whole.window(config.warmup)
@@ -122,7 +122,7 @@ class WalkDemands(StaysUp):
         )
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`."""
+        """See `AcceptanceCriteria`."""
         whole = unrolled(whole, self.wish)
         window = whole.window(config.warmup)
         told = describe(window, config.gait.clearance) | {"sides": sides(window)}
@@ -134,7 +134,7 @@ class WalkDemands(StaysUp):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: no early end, and clearly faster than required, or near a target speed."""
+        """See `AcceptanceCriteria`: no early end, and clearly faster than required, or near a target speed."""
         lived = to_the_end(outcome, seconds, creature)
         if "speed" in self.wish:
             came = outcome["forward"] / seconds / self.wish["speed"]
