@@ -21,6 +21,8 @@ from mjxgait.reference.starts import Starts, perturbed_starts, pushed_starts
 
 FLOORS = 4
 """Number of rough floors among which the starts are divided."""
+TRIALS = 9
+"""Number of stress tests; a hasty examination stops at the first that fails."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,6 +10,7 @@ import pydantic
 
 from mjxgait.certification.certificate import schema_of
 from mjxgait.certification.criteria import Criterion, Measure
+from mjxgait.certification.stress import TRIALS, StressConfig
 from mjxgait.certification.verdict import criteria_of, judged
 from mjxgait.champion import Champion
 from mjxgait.config.tables import STORED, Flag, Index, Number, Text, check
@@ -85,6 +86,7 @@ class _Stress:
     __pydantic_config__ = STORED
     passed: Flag
     trials: list[_Trial]
+    config: dict[str, float]
     champion: Text = ""
 
 
@@ -100,11 +102,25 @@ def read_certificate(path: Path) -> dict[str, Any] | None:
 def read_stress(path: Path, champion: Champion) -> dict[str, Any] | None:
     """Read what `Stress.document` says of this champion; None without a file on this champion.
 
+    `passed`, of each trial and of all, is derived from the shares by the shipped settings.
+    `reservation`: why the trials do not count as the stress tests; empty if they do.
+
     Raises:
       UserError: it is no such file.
     """
     document = _read(path, _Stress, "stress")
-    return document if document and document.get("champion") == champion.fingerprint else None
+    if not document or document.get("champion") != champion.fingerprint:
+        return None
+    shipped, given = dataclasses.asdict(StressConfig()), document["config"]
+    other = [f"{key} = {given.get(key)}" for key in shipped if given.get(key) != shipped[key]]
+    trials = [t | {"passed": t["share"] >= shipped["share"]} for t in document["trials"]]
+    reservation = ""
+    if other:
+        reservation = f"its stress tests are by other settings: {', '.join(other)}"
+    elif len(trials) < TRIALS and all(trial["passed"] for trial in trials):
+        reservation = f"only {len(trials)} of {TRIALS} stress tests were run"
+    passed = not reservation and all(trial["passed"] for trial in trials)
+    return document | {"trials": trials, "reservation": reservation, "passed": passed}
 
 
 def _read(path: Path, schema: type, command: str) -> dict[str, Any] | None:

@@ -101,6 +101,8 @@ def _anywhere(snapshot: Snapshot) -> str:
         return ""
     if document["passed"]:
         return " It walks anywhere."
+    if document["reservation"]:
+        return f" It is not known to walk anywhere: {document['reservation']}."
     short = [f"{t['name']} {t['share']:.0%}" for t in document["trials"] if not t["passed"]]
     return f" It does not walk anywhere: {', '.join(short)}."
 

@@ -157,6 +157,8 @@ def _anywhere(run: Path, champion: Champion) -> str:
     if document is None:
         return ""
     verdict = "It walks anywhere." if document["passed"] else "It does not walk anywhere."
+    if document["reservation"]:
+        verdict = f"It is not known to walk anywhere: {html.escape(document['reservation'])}."
     rows = [
         [t["name"], f"{t['share']:.0%}", "pass" if t["passed"] else "fails"]
         for t in document["trials"]

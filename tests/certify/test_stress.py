@@ -9,6 +9,7 @@ from certify_made_up import make_champion
 
 from mjxgait.certification import stress as module
 from mjxgait.certification.stress import (
+    TRIALS,
     Stress,
     StressConfig,
     Trial,
@@ -36,6 +37,7 @@ def test_who_stands_does_not_walk_anywhere(tiny):
     told = []
     found = stress(tiny, make_champion(tiny), SHORT, told.append)
     assert told == [trial.name for trial in found.trials] == NAMES
+    assert len(NAMES) == TRIALS
     assert not any(trial.passed for trial in found.trials)
     assert not found.passed
 

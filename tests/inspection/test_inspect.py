@@ -17,7 +17,7 @@ from helpers import made_up_certificate, said_by
 from inspection.made_up import FORCED, LAST, POPULATION
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.stress import Stress, StressConfig, Trial
+from mjxgait.certification.stress import TRIALS, Stress, StressConfig, Trial
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
 from mjxgait.config.tables import build
@@ -176,6 +176,12 @@ def test_tells_whether_the_champion_walks_anywhere(run):
     assert said.endswith("It does not walk anywhere: friction 0.4 25%.")
     assert anywhere is False
     said, anywhere = told(Stress(fingerprint, tuple(trials[:1]), StressConfig()))
+    assert said.endswith("only 1 of 9 stress tests were run.")
+    assert anywhere is False
+    all_of_them = tuple(trials[:1]) * TRIALS
+    said, _ = told(Stress(fingerprint, all_of_them, StressConfig(share=0.2)))
+    assert said.endswith("its stress tests are by other settings: share = 0.2.")
+    said, anywhere = told(Stress(fingerprint, all_of_them, StressConfig()))
     assert said.endswith("It walks anywhere.")
     assert anywhere is True
     said, anywhere = told(Stress("another", tuple(trials), StressConfig()))
