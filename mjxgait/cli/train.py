@@ -63,7 +63,7 @@ class TrainOptions:
         (docs/reference/expressions.md).
       out: Folder for the run; by default a new one under runs/.
       runs: Number of separate runs side by side, with seeds from --seed on: a folder with a run
-        folder each, and a picture of all champions (docs/guide/several-runs.md).
+        folder each, and a picture of all champions (docs/guide/studies.md).
       resume: Run folder to continue, with its own creature and settings. Only the settings that end
         a run may differ: --generations, --evolution.target, --examination.
       generation: With --resume: the checkpoint to continue from, instead of the latest.
