@@ -109,7 +109,7 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> Validation:
     def certify(*_: object, attempts: int, **__: object) -> Certificate:
         return certificate(said.answer("exam", said.certificates), attempts)
 
-    monkeypatch.setattr(examination, "glance", nominal_check)
+    monkeypatch.setattr(examination, "nominal_check", nominal_check)
 
     def rehearse(*_: object, wanted: float, caution: float) -> float:
         said.wanted.append(wanted)
@@ -163,7 +163,7 @@ def test_a_promising_best_with_room_is_examined_and_ends_the_run(experiment, loo
 
 
 @pytest.mark.parametrize(
-    ("generation", "speed", "alive", "glance", "rehearsal", "asked"),
+    ("generation", "speed", "alive", "nominal_check", "rehearsal", "asked"),
     [
         (4, 0.7, 1.0, 0.3, 0.3, 0),  # not the generation to look
         (3, 0.55, 1.0, 0.3, 0.3, 0),  # hardly faster than it must be
@@ -479,7 +479,7 @@ def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
     with monkeypatch.context() as patch:
         patch.setattr(RunLooks, "begin", never_beside)
         trained(waited, experiment)
-    monkeypatch.setattr(examination, "glance", late)
+    monkeypatch.setattr(examination, "nominal_check", late)
     said = trained(beside, experiment)
     assert "up to generation 5, is forgotten" in said
     assert "Certified with a margin of 0.30 in generation 3" in said

@@ -1,21 +1,14 @@
 """Ray backend: one worker per core of every machine with the same versions as this one.
 
-A result's bits thus do not depend on a machine's number of cores. Nothing here imports JAX before
-`ENVIRONMENT` is set.
-
 Each worker is an actor that stays on its machine. Ray repeats nothing: losses are reported to the
-crew, and a new worker starts if the machine still lives.
+scheduler, and a new worker starts if the machine still lives.
 """
 
-import contextlib
 import dataclasses
-import os
 import sys
-import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import ray
@@ -29,75 +22,7 @@ from mjxgait.distributed.connect import Machine
 from mjxgait.distributed.jobs import Job
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Backend, Report, Worker
-
-ENVIRONMENT = {
-    "NPROC": "1",  # XLA's threads
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "JAX_NUM_CPU_DEVICES": "1",
-    "JAX_PLATFORMS": "cpu",
-}
-
-ROOM = 2**20
-"""Bytes that a creature's files or a lock may take."""
-
-
-class RemoteWorker:
-    """An actor that runs jobs. tag: of its kind of machine, see `Machine`."""
-
-    def __init__(self, tag: str) -> None:
-        os.environ.update(ENVIRONMENT)
-        from mjxgait.distributed.recipe import Programs
-        from mjxgait.training.stages import prepare_devices
-
-        prepare_devices(1, tag)
-        self._programs = Programs(_turn)
-
-    def ready(self) -> int:
-        """Return the process id, once the worker can work.
-
-        Raises:
-          OSError: there is no room for a creature's files.
-        """
-        from mjxgait.training.stored import try_room
-
-        try_room(Path(tempfile.gettempdir()), ROOM)
-        return os.getpid()
-
-    def do(self, recipe: Any, job: Any) -> tuple[Any, float]:
-        """Return the job's result and its duration in s."""
-        began = time.perf_counter()
-        result = job.do(self._programs, recipe)
-        return result, time.perf_counter() - began
-
-
-@contextlib.contextmanager
-def _turn(name: str, patience: float = -1.0) -> Iterator[None]:
-    """Let one worker of a machine compile a program; the others then find it in the cache.
-
-    Without a writable cache each compiles at once. patience: s; waits forever by default.
-    """
-    import filelock
-    import jax
-
-    from mjxgait.training.stored import try_room
-
-    folder = Path(jax.config.values["jax_compilation_cache_dir"])
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        try_room(folder, ROOM)
-        lock = filelock.FileLock(folder / f"{name}.lock")
-        lock.acquire(timeout=patience)
-    except filelock.Timeout:
-        raise
-    except OSError:
-        yield
-        return
-    try:
-        yield
-    finally:
-        lock.release()
-
+from mjxgait.distributed.worker import RemoteWorker
 
 EVERY = 1.0
 """Seconds between two checks for new machines."""

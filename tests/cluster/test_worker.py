@@ -7,7 +7,7 @@ from pathlib import Path
 import jax
 import pytest
 
-from mjxgait.distributed.ray_backend import _turn
+from mjxgait.distributed.worker import _turn
 
 filelock = pytest.importorskip("filelock", reason='needs "mjxgait[cluster]"')
 
