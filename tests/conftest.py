@@ -20,6 +20,7 @@ os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
 os.environ["JAX_NUM_CPU_DEVICES"] = "2"
 
 import jax
+import psutil
 import pytest
 from helpers import STOOL
 
@@ -66,11 +67,18 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(100_000, 20, 20)
 
 
+MOST_MEMORY = 2 * 2**30
+"""Bytes of a worker above which compiled programs are dropped; the cache on the disk has them still."""
+
+
 @pytest.fixture(scope="module", autouse=True)
 def give_memory_back() -> Iterator[None]:
-    """Compiling leaves a gigabyte with the C library, which keeps it unless it is asked."""
+    """Drop compiled programs if they take much memory, and return what the C library holds."""
     yield
-    with contextlib.suppress(AttributeError, OSError, TypeError):  # only glibc can be asked
+    if psutil.Process().memory_info().rss > MOST_MEMORY:
+        jax.clear_caches()
+        gc.collect()
+    with contextlib.suppress(AttributeError, OSError, TypeError):  # only glibc has the function
         ctypes.CDLL(None).malloc_trim(0)
 
 

@@ -112,6 +112,7 @@ settings = {{ evolution = {{ mutation_rate = 0.2 }} }}
 """
 
 
+@pytest.mark.thorough("another test trains it; tests/ablation runs a study")
 def test_it_takes_part_in_studies(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """The processes that measure champions, here on two grounds, load it as well."""
     monkeypatch.chdir(folder)

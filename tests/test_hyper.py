@@ -140,7 +140,7 @@ def batch(balls: Creature) -> Batch:
 
 
 @pytest.fixture(scope="module")
-def step(batch: Batch, as_shipped: None) -> Step:
+def step(batch: Batch, emitted_as_shipped: None) -> Step:
     return batch.compile()
 
 

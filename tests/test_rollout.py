@@ -362,7 +362,9 @@ def test_the_stride_limit_of_a_dog():
     assert stride_limit(20.0) == pytest.approx(3.53, abs=0.01)
 
 
-@pytest.mark.parametrize("name", ["crab", "duck"])
+@pytest.mark.parametrize(
+    "name", ["crab", pytest.param("duck", marks=pytest.mark.thorough("another body"))]
+)
 def test_mjx_agrees_with_c_mujoco(name: str):
     """The same controlled motion, 60 steps through touchdown, in float32 MJX and in float64 C MuJoCo."""
     creature, config = load_creature(find_creature(name)), Config()

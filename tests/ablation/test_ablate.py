@@ -66,8 +66,40 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def finished(study: Path, emitted_as_shipped: None) -> tuple[Path, str]:
+    """Folder and report of a study that was killed amid its runs, and then while it measured.
+
+    The second time as a system kills that is out of memory: then it says so, and goes on too.
+    """
     folder = study.parent / "out"
-    return folder, mjxgait("ablate", study, "--out", folder)
+    process = subprocess.Popen(
+        command("ablate", study, "--out", folder),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    log = folder / "groups/0/metrics.jsonl"
+    while not (log.exists() and any(line["generation"] >= 1 for line in read_metrics(log))):
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    begun, _ = process.communicate()
+    process = subprocess.Popen(
+        command("ablate", "--resume", folder), stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    measured = folder / "measured.jsonl"
+    # At work, and not while it is started.
+    while not measured.exists() or measured.read_bytes().count(b"\n") < 1:
+        assert process.poll() is None
+        time.sleep(0.001)
+    worker_of(process).kill()
+    said = process.communicate(timeout=300)[1].decode()
+    assert process.returncode == 2
+    assert re.fullmatch(
+        f"mjxgait: {folder}: .* was killed from outside, .* go on with "
+        f"mjxgait ablate --resume {folder}\n",
+        said,
+    )
+    return folder, begun + mjxgait("ablate", "--resume", folder)
 
 
 def test_the_report_holds_everything(finished: tuple[Path, str]):
@@ -155,42 +187,13 @@ def worker_of(process: subprocess.Popen) -> psutil.Process:
     raise AssertionError(process.communicate())
 
 
-def test_a_study_killed_amid_its_runs_and_then_while_it_measures_ends_the_same(
+@pytest.mark.thorough("the study of all other tests here was killed twice")
+def test_a_study_killed_twice_ends_as_one_that_was_not(
     finished: tuple[Path, str], study: Path, tmp_path: Path
 ):
-    """The second time as a system kills that is out of memory: then it says so, and goes on too."""
-    whole, _ = finished
-    folder = tmp_path / "killed"
-    process = subprocess.Popen(
-        command("ablate", study, "--out", folder),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    log = folder / "groups/0/metrics.jsonl"
-    while not (log.exists() and any(line["generation"] >= 1 for line in read_metrics(log))):
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    process = subprocess.Popen(
-        command("ablate", "--resume", folder), stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
-    measured = folder / "measured.jsonl"
-    # At work, and not while it is started.
-    while not measured.exists() or measured.read_bytes().count(b"\n") < 1:
-        assert process.poll() is None
-        time.sleep(0.001)
-    worker_of(process).kill()
-    said = process.communicate(timeout=300)[1].decode()
-    assert process.returncode == 2
-    assert re.fullmatch(
-        f"mjxgait: {folder}: .* was killed from outside, .* go on with "
-        f"mjxgait ablate --resume {folder}\n",
-        said,
-    )
-    mjxgait("ablate", "--resume", folder)
+    mjxgait("ablate", study, "--out", tmp_path / "whole")
     for name in ("results.csv", "generations.parquet"):
-        assert (folder / name).read_bytes() == (whole / name).read_bytes()
+        assert (tmp_path / "whole" / name).read_bytes() == (finished[0] / name).read_bytes()
 
 
 def test_a_study_that_would_take_days_is_refused_with_the_estimate(
