@@ -308,11 +308,11 @@ def goals(creature: Creature, draw: trials.Draw) -> np.ndarray:
 def test_nobody_knows_the_goals_of_the_examination(tiny: Creature, trotter: Champion):
     """Not evolution, and not who has seen the goals by which champions are chosen."""
     task = Hop(tiny, STEP, 1000, tiny.settings.termination)
-    trials = task.trials(key_of(0), tiny, RolloutConfig(starts=64)).goal[1:]
+    evolved = task.trials(key_of(0), tiny, RolloutConfig(starts=64)).goal[1:]
     mine = goals(tiny, trials.own(trotter, CONFIG))
     assert len(set(mine.tolist())) == 64
     np.testing.assert_array_equal(mine, goals(tiny, trials.own(trotter, CONFIG)))
-    for known in (trials, goals(tiny, trials.common(CONFIG)), [CONFIG.hop.nominal]):
+    for known in (evolved, goals(tiny, trials.common(CONFIG)), [CONFIG.hop.nominal]):
         assert not np.isin(mine.astype(np.float32), np.float32(known)).any()
     low, high = CONFIG.hop.goals
     assert low <= mine.min() < low + 0.2

@@ -50,8 +50,9 @@ TRAINED = {
     "limbo": "tests/test_limbo.py",
     "swim": "tests/blocks/test_swimming.py",
     "follow-on-land": "tests/blocks/test_roaming.py",
+    "travel": "tests/test_travel.py",
 }
-"""Tasks that another test evolves, and where."""
+"""Tasks that another test evolves or, of travel, runs against the examiner; and where."""
 EVOLVED = [way for way in first_of_each_task(WAYS) if task_of(way) not in TRAINED]
 
 

@@ -37,7 +37,10 @@ class BodyPerStart(Simulator):
         return dataclasses.replace(lane, body=dataclasses.replace(lane.body, parameters=own))
 
 
-@pytest.fixture(scope="module", params=["auto", "mjx"])
+MJX = pytest.mark.thorough("test_bodies has MJX, a step at a time")
+
+
+@pytest.fixture(scope="module", params=["auto", pytest.param("mjx", marks=MJX)])
 def tallies(request: pytest.FixtureRequest, stool: Creature) -> tuple[Tally, list[Tally]]:
     """Of three starts with three bodies, together; and of all starts with each body."""
     settings = {"physics": request.param, "lanes": 2, "starts": len(BODIES), "terminate": False}

@@ -60,6 +60,7 @@ def quadrupeds() -> list[mujoco.MjModel]:
     return variants
 
 
+@pytest.mark.thorough("another body")
 def test_a_shipped_quadruped_whose_body_is_varied(quadrupeds: list[mujoco.MjModel]):
     creature = load_creature(find_creature("tall_quadruped"))
     layout = sense_layout(creature)

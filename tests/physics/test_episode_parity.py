@@ -77,7 +77,14 @@ def starts_of(creature: Creature, films: list[Outcome]) -> Starts:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *wanted)
 
 
-@pytest.fixture(scope="module", params=["auto", "mjx"], ids=["the fast step", "plain MJX"])
+MJX = pytest.mark.thorough("test_fast_parity compares the fast step with MJX")
+
+
+@pytest.fixture(
+    scope="module",
+    params=["auto", pytest.param("mjx", marks=MJX)],
+    ids=["the fast step", "plain MJX"],
+)
 def tallies(request: pytest.FixtureRequest, body: Creature, outcomes: list[Outcome]) -> Tally:
     """Evolution's, leaves [B, 1, R, ...]."""
     rollout = {"seconds": SECONDS, "lanes": 3, "physics": request.param, **LENIENT}

@@ -80,7 +80,12 @@ def plants() -> SimpleNamespace:
     )
 
 
-@pytest.fixture(scope="module", params=EXACT)
+MORE = pytest.mark.thorough("another ground")
+
+
+@pytest.fixture(
+    scope="module", params=["rough:0.3@1", pytest.param("slope:0.3:across", marks=MORE)]
+)
 def scene(request: pytest.FixtureRequest, plants: SimpleNamespace) -> Scene:
     spec = parse_ground(request.param)
     start = np.zeros(3)
