@@ -76,7 +76,7 @@ class TrainOptions:
       gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave
         (six),
         walk, waddle, hop (two), natural (an animal's at this speed), or auto (whatever evolves). By
-        default the usual gait in creature.toml: natural for both dogs.
+        default that of [usual] in creature.toml, or else whatever evolves.
       turn: Turn rate while walking, degrees per second to the left.
       steer: Largest commanded turn rate that the walk must follow, degrees per second to either
         side.
