@@ -29,7 +29,7 @@ A_SECOND = 4
 
 @contextlib.contextmanager
 def scheduler_at(address: str | None, console: Console | None = None) -> Iterator[Scheduler]:
-    """Yield the crew of the cluster at an address, shown live; without one this process alone.
+    """Yield the scheduler of the cluster at an address, shown live; without one this process alone.
 
     Raises:
       UserError: see `connected`.

@@ -143,7 +143,7 @@ def _joined(pieces: Sequence[Advanced]) -> Advanced:
 
 
 class Blocks:
-    """Chunked `Evaluator`: a crew evaluates a run's genomes in chunks of equal size.
+    """Chunked `Evaluator`: a scheduler evaluates a run's genomes in chunks of equal size.
 
     The size fixes a chunk's bits: they do not depend on the number of machines.
 

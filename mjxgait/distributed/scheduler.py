@@ -96,17 +96,17 @@ def _never() -> bool:
 class Scheduler:
     """Available workers and their jobs.
 
-    tell: called with messages for the user. watch: called with the crew now and then.
+    tell: called with messages for the user. watch: called with the scheduler now and then.
     """
 
     def __init__(
         self,
-        hands: Backend,
+        backend: Backend,
         tell: Callable[[str], object] = lambda said: None,
         watch: Callable[["Scheduler"], object] = lambda scheduler: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.hands, self._tell, self._watch, self._clock = hands, tell, watch, clock
+        self.backend, self._tell, self._watch, self._clock = backend, tell, watch, clock
         self._waiting: deque[_Task] = deque()
         self._open: dict[Hashable, _Task] = {}
         self._ready: deque[tuple[Hashable, Any]] = deque()
@@ -155,10 +155,10 @@ class Scheduler:
         return None
 
     def _turn(self) -> None:
-        self.idle += self.hands.arrivals()
+        self.idle += self.backend.arrivals()
         self._look_around()
         self._hand_out()
-        for report in self.hands.wait(TICK):
+        for report in self.backend.wait(TICK):
             self._take(report)
         self._watch(self)
 
@@ -168,7 +168,7 @@ class Scheduler:
             worker = self.idle.pop()
             task.workers += 1
             self.busy[worker] = _Turn(task, self._clock())
-            self.hands.start(worker, *task.work)
+            self.backend.start(worker, *task.work)
 
     def _late(self) -> _Task | None:
         """Return the oldest late job that has one worker only."""

@@ -75,7 +75,7 @@ def run_study(
     """Run or resume all groups; return whether all were completed.
 
     Args:
-      crew: scheduler; this process alone runs one group after the other.
+      scheduler: runs the jobs; this process alone runs one group after the other.
       stride: generations between two checkpoints of a group.
     """
     parts = groups(plan)
