@@ -537,7 +537,7 @@ def test_to_walk_anywhere_is_learnt_on_all_that_it_is_asked_for(body: Creature):
     assert rollout.rough >= asked.bumps
     assert rollout.friction[0] <= asked.friction
     assert rollout.push >= asked.push
-    with pytest.raises(UserError, match="only who is to walk"):
+    with pytest.raises(UserError, match="it is for walks"):
         check_fit(body, dataclasses.replace(config, use=UseConfig("program", "hop")))
 
 
