@@ -102,6 +102,7 @@ def test_as_constants_it_has_one_of_its_own(stool, tmp_path: Path):
     assert program(other, physics="mjx") != program(stool, physics="mjx")
 
 
+@pytest.mark.thorough("tests/physics/test_bodies.py compares steps of bodies as inputs")
 def test_the_motion_is_that_of_the_bodys_own_program(stool: Creature, tmp_path: Path):
     """The stool's program with another body's numbers, against one made for that body."""
     other = changed(tmp_path / "other", *OTHERS["thicker, so heavier"])

@@ -171,6 +171,7 @@ def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
     assert without_times(folder) == without_times(finished[0])
 
 
+@pytest.mark.thorough("a run that is killed three times is compared too")
 def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
     finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
 ):

@@ -56,6 +56,7 @@ main(sys.argv[1:])
 """
 
 
+@pytest.mark.thorough("the check has no ray; this trains in a process that must not find it")
 def test_a_laptop_needs_no_ray(tmp_path: Path):
     """A whole run, and on islands too."""
     small = "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.starts 2"
