@@ -30,7 +30,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
 
 import jax
-from simulated import RayBackend, machines
+from simulated import Machines, machines
 
 from mjxgait.api import load_creature
 from mjxgait.config.schema import Config
@@ -226,7 +226,7 @@ def looking(scheduler: Scheduler) -> float:
     """us of `ray.wait` per result that is not there yet."""
     import ray  # only after `simulated` has set its environment
 
-    actor, _ = next(iter(scheduler.hands._actors.values()))
+    actor, _ = next(iter(scheduler.backend._actors.values()))
     recipe = ray.put(Recipe({}, ()))
     refs = [actor.do.remote(recipe, Nothing(seconds=0.02)) for _ in range(1000)]
     began, count = time.perf_counter(), 50
@@ -264,7 +264,7 @@ class Timed:
 
 
 @contextlib.contextmanager
-def bound(count: int) -> Iterator[RayBackend]:
+def bound(count: int) -> Iterator[Machines]:
     """Machines of one core each, the n-th bound to core n; this process is not bound."""
     before = os.sched_getaffinity(0)
     cores = sorted(before)
@@ -320,7 +320,7 @@ def in_turns(clock: Clock, work: Callable[[], None], laps: int) -> dict[str, Any
 
 def work_of(scheduler: Scheduler) -> float:
     """Seconds of work of all workers."""
-    return float(sum(scheduler.hands.seconds.values()))
+    return float(sum(scheduler.backend.seconds.values()))
 
 
 def gather(scheduler: Scheduler, count: int) -> None:

@@ -3,8 +3,7 @@
     python benchmarks/cluster_faults.py study    # random kills of workers, machines and the command
     python benchmarks/cluster_faults.py islands  # the same in a run on four islands
     python benchmarks/cluster_faults.py blocks   # the same in one population, judged in blocks
-    python benchmarks/cluster_faults.py disk     # machines whose disk is full (mounts one: needs
-    root)
+    python benchmarks/cluster_faults.py disk     # full disks (mounts one: needs root)
 
 One undisturbed run, then others until there were `--kills` kills; a killed command is called again
 with `--resume`. All must give the same results, and no finished champion may be written again.

@@ -1,8 +1,7 @@
 """Model of a large cluster: the real scheduler, with a backend and clock of measured costs.
 
     python benchmarks/cluster_paper.py FILE          # that `cluster.py rows blocks calls` wrote
-    python benchmarks/cluster_paper.py FILE --check  # the same reckoning against Ray, tiny fake
-    work
+    python benchmarks/cluster_paper.py FILE --check  # the same against Ray, with tiny fake work
 
 Counted: the seconds of a job; this machine's costs of dispatching and collecting, serially, by
 number and bytes; a check of all running jobs at every turn; storing the results on disk. Not

@@ -85,7 +85,7 @@ def state_with(
     )
 
 
-class Validation:
+class Looks:
     """What the examiner will say, the last of a list over and over, and what it was asked."""
 
     def __init__(self) -> None:
@@ -100,8 +100,8 @@ class Validation:
 
 
 @pytest.fixture
-def looks(monkeypatch: pytest.MonkeyPatch) -> Validation:
-    said = Validation()
+def looks(monkeypatch: pytest.MonkeyPatch) -> Looks:
+    said = Looks()
 
     def nominal_check(*_: object) -> SimpleNamespace:
         return SimpleNamespace(margin=said.answer("glance", said.glances))
@@ -134,7 +134,7 @@ def test_it_looks_every_few_generations_and_not_at_the_first():
 
 
 def test_the_draw_to_choose_on_counts_with_the_caution_of_the_settings(
-    experiment: Experiment, looks: Validation, exams: Exams
+    experiment: Experiment, looks: Looks, exams: Exams
 ):
     examiner(experiment, exams, caution=1.5).best(ranked(experiment))
     assert set(looks.cautions) == {1.5}
@@ -407,7 +407,7 @@ def test_in_the_end_one_that_has_failed_before_is_not_chosen(experiment, looks, 
 
 
 @pytest.fixture
-def promising(monkeypatch: pytest.MonkeyPatch, looks: Validation) -> None:
+def promising(monkeypatch: pytest.MonkeyPatch, looks: Looks) -> None:
     """Everybody is promising, so that the small run is looked at."""
     monkeypatch.setattr(examination, "_promising", lambda *_: True)
 
@@ -451,7 +451,7 @@ def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
     tmp_path: Path,
     experiment: Experiment,
     promising: None,
-    looks: Validation,
+    looks: Looks,
     monkeypatch: pytest.MonkeyPatch,
 ):
     """Whatever the machine does first, the folder is the one of a run that waited."""
@@ -518,7 +518,7 @@ def test_what_goes_wrong_in_a_look_ends_the_run_as_it_would_have(
 
 
 def test_one_that_never_passes_goes_on_to_the_end(
-    tmp_path: Path, experiment: Experiment, promising: None, looks: Validation
+    tmp_path: Path, experiment: Experiment, promising: None, looks: Looks
 ):
     looks.certificates = [-0.5]
     folder = tmp_path / "run"

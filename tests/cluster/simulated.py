@@ -17,7 +17,7 @@ HASTY = {"health_check_period_ms": 1000, "health_check_failure_threshold": 8}
 """Else it takes 20 s until a machine that is silent is given up."""
 
 
-class RayBackend:
+class Machines:
     """Each has so many cores; the first is the head."""
 
     def __init__(self) -> None:
@@ -58,8 +58,8 @@ def workers() -> list[psutil.Process]:
 
 
 @contextlib.contextmanager
-def machines(count: int) -> Iterator[RayBackend]:
-    made = RayBackend()
+def machines(count: int) -> Iterator[Machines]:
+    made = Machines()
     try:
         for _ in range(count - 1):
             made.add()
