@@ -1,8 +1,7 @@
 """The measuring machine, operations of a program, and the distance to what the cores can do.
 
-A compiler may repeat or save some.
-
-Operations and bytes are counted in the compiled step and compared with a measured peak.
+Operations are counted in the program as written; a compiler may repeat or save some. Operations and
+bytes of the compiled step are compared with a measured peak.
 """
 
 import math

@@ -1,11 +1,7 @@
 """Description of a gait without thresholds: speed, effort, rhythm, footfalls and name.
 
-Letters: `F` frequencies, `J` actuated joints.
-
-Times of footfalls do not count: in a canter the left and the right fall at different times.
-Letters: `J` actuated joints, `N` feet.
-
-`N` feet.
+Left and right are compared without the times of footfalls: in a canter they fall at different
+times. Letters: `F` frequencies, `J` actuated joints, `N` feet.
 """
 
 import itertools

@@ -1,10 +1,8 @@
 """Stable PD control, and the drive from a controller's command to joint torques.
 
-"Stable proportional-derivative controllers" in two elementwise parts, for one creature or a batch.
-The solve with `M + h diag(kd)` between them needs the mass matrix; `drive.Drive.torque` joins all
-three.
-
-Stable PD (Tan, Liu & Turk 2011) or plain PD tracks a pose; a torque is only clamped.
+Stable PD (Tan, Liu & Turk 2011, "Stable proportional-derivative controllers") or plain PD tracks a
+pose; a torque is only clamped. Stable PD is two elementwise parts, for one creature or a batch. The
+solve with `M + h diag(kd)` between them needs the mass matrix; `Drive.torque` joins all three.
 """
 
 import dataclasses

@@ -1,6 +1,6 @@
 """A creature with other proportions, another time step, or another heading.
 
-For evolution and certification, walking backwards is walking forward with the body turned around.
+A walk backwards is evolved and examined as a walk forward of the body turned around.
 """
 
 import dataclasses

@@ -5,9 +5,7 @@ and their pose combinations were permuted to produce unique children. The parent
 all returned into the population" (Wilson, 3.5). A child may have an elder sibling as its parent,
 and each child differs from every genome before it.
 
-Letters: `P` population, `M` offspring, `N` all of them.
-
-Letters: `P` population, `M` offspring; `R`, `F` trials and terms.
+Letters: `P` population, `M` offspring, `N` all of them; `R`, `F` trials and terms.
 """
 
 import dataclasses

@@ -1,4 +1,4 @@
-"""Weakening of the balance feedback until the creature stands with it.
+"""Stand test in C MuJoCo, and weakening of the balance feedback until the creature stands with it.
 
 A loop that is too strong for the body shakes it off its feet.
 """

@@ -1,7 +1,6 @@
-"""Kinematic model of the creature as it will be written, for poses and mirror images.
+"""Text of creature.xml, and the kinematic model of the creature as it will be written.
 
-Every physics backend can simulate its options.
-
+Every physics backend can simulate the options in the text. The model gives poses and mirror images.
 Letters: `J` active joints, `B` bodies in the list's order (MuJoCo's ids less one).
 """
 

@@ -1,6 +1,6 @@
-"""Bodies, joints and shapes of a creature between the compiled model and its folder.
+"""Bodies, joints and shapes of a creature between the compiled model and its folder; import notes.
 
-All in SI units.
+All quantities are in SI units.
 """
 
 import contextlib

@@ -1,9 +1,7 @@
 """Roles of a skeleton's bones at rest, and the hinges between them.
 
-Letters: `B` bones.
-
 A limb swings and spreads where it begins, and bends in one direction below; a spine bends in one
-place. Axes are the file's; angles are deg from rest.
+place. Axes are the file's; angles are deg from rest. Letters: `B` bones.
 """
 
 import dataclasses

@@ -1,11 +1,10 @@
 """Quantities that every plant derives: sensed parts, overlap depth, inverse masses.
 
-MuJoCo scales the softness of contacts and limits with them (`body_invweight0`, `dof_invweight0`;
-computation docs, "Parameters"). They are those of the body at rest, so they change with its masses
-and lengths.
-
-Left out: for a body that slides on the world, turns about nothing and carries nothing, MuJoCo
-takes its inverse mass instead of the mean. No part of a creature is one.
+MuJoCo scales the softness of contacts and limits with inverse masses (`body_invweight0`,
+`dof_invweight0`; computation docs, "Parameters"). They are those of the body at rest, so they
+change with its masses and lengths. Left out: for a body that slides on the world, turns about
+nothing and carries nothing, MuJoCo takes its inverse mass instead of the mean. No part of a
+creature is one.
 """
 
 import dataclasses

@@ -1,6 +1,7 @@
 """Controllers and tasks from a user's file, named only on the command line.
 
-Body, drive and criteria are still implemented twice; the controller is not.
+For a user's controller, body, drive and criteria are still implemented twice; the controller is
+not.
 """
 
 import importlib.util

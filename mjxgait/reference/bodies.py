@@ -1,9 +1,7 @@
-"""Bodies that one thread simulates on C MuJoCo: arrays, observations, falls.
+"""Bodies that one thread simulates on C MuJoCo: arrays, observations, falls, water.
 
-Written from docs/reference/modular-bodies.md. Letters: `S` simulations, `B` blocks, `Q` points of a
-block's faces.
-
-Letters: `S` simulations, `J` actuated joints, `F` feet, `nq nv` as in MuJoCo.
+Water is written from docs/reference/modular-bodies.md. Letters: `S` simulations, `J` actuated
+joints, `F` feet, `nq nv` as in MuJoCo, `B` blocks, `Q` points of a block's faces.
 """
 
 from collections.abc import Collection

@@ -1,8 +1,6 @@
 """Controllers that change or halt during a simulation.
 
 Letters: `S` simulations, `J` actuated joints.
-
-Letters: `S` simulations, `J` actuated joints.
 """
 
 from collections.abc import Mapping

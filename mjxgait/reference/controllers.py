@@ -1,6 +1,6 @@
 """Reference controllers: one per kind, in NumPy and float64, for many simulations at once.
 
-`S` simulations, `J` actuated joints.
+Letters: `S` simulations, `J` actuated joints.
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,6 @@
-"""Measurements of a recorded trajectory for the criteria: contacts, slip, clearance, power.
+"""Measurements of a recorded trajectory for the criteria: contacts, slip, clearance, power, strides.
 
-Letters: `T` frames, `J` actuated joints, `N` feet, `B` bodies.
-
-Letters: `T` frames, `N` feet, `R` strides.
+Letters: `T` frames, `J` actuated joints, `N` feet, `B` bodies, `R` strides.
 """
 
 import dataclasses

@@ -1,11 +1,8 @@
 """Measurements of recorded frames: places of parts, floor contact, overlap, grown bodies.
 
-Uses MuJoCo's collisions between the true shapes, including visual-only geoms.
+Overlap uses MuJoCo's collisions between the true shapes, including visual-only geoms. Quantities
+that need no MuJoCo call per frame are computed for all frames at the end.
 Letters: `T` frames, `P` pairs of parts.
-
-Letters: `T` frames.
-
-Quantities that need no MuJoCo call per frame are computed for all frames at the end.
 """
 
 import dataclasses

@@ -1,8 +1,6 @@
 """State of simulations, and observations by name, written from docs/reference/controller.md.
 
 Letters: `S` simulations, `J` actuated joints, `F` feet, `nv` degrees of freedom.
-
-Letters: `S` simulations, `J` actuated joints, `nv` degrees of freedom.
 """
 
 import dataclasses

@@ -1,6 +1,6 @@
 """Plots of a run over its generations, in the style of all plots.
 
-lines: of `metrics.jsonl`.
+`lines` are those of `metrics.jsonl`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,6 +1,6 @@
 """Drawings of genomes: expression trees, and graphs beside the bodies that grow from them.
 
-Leaves stand side by side, each parent in the middle of its children.
+In a tree, leaves stand side by side, each parent in the middle of its children.
 """
 
 import dataclasses

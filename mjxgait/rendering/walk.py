@@ -1,8 +1,6 @@
-"""A champion's undisturbed walk, simulated once in C MuJoCo: the source of every picture, video and
-animation.
+"""A champion's undisturbed walk, simulated once in C MuJoCo, the source of all pictures and clips.
 
-They collide with nothing and are in no simulation.
-
+Overlays (goals, a bar) collide with nothing and are in no simulation.
 Letters: `T` frames (control steps), `J` joints, `G` geoms, `nq` as in MuJoCo.
 """
 

@@ -1,6 +1,6 @@
 """Parts of a GLB file: its binary buffer, and marks on the floor.
 
-Rungs pass with a walk; tiles are moved by a page. glTF's axes: Y up, forward +Z.
+Rungs pass with a walk; tiles are moved by a page. Axes are glTF's: Y up, forward +Z.
 """
 
 import numpy as np

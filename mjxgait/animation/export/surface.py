@@ -1,11 +1,9 @@
-"""Surface of a creature as triangles, one piece per colour. Letters: `V` vertices, `F` triangles.
+"""Surface of a creature as triangles, one piece per colour, and bones along its limbs.
 
-A joint's Y axis leads to the next joint, and its X axis is the axis of the part's hinge. glTF's
-axes: Y up, forward +Z, left +X. A glTF joint has no tail; programs use the way to its child
+Axes are glTF's: Y up, forward +Z, left +X. A joint's Y axis leads to the next joint, and its X axis
+is the axis of the part's hinge. A glTF joint has no tail; programs use the way to its child
 instead, so the last joint of a limb gets a child at its tip, the end for inverse kinematics.
-Letters: `B` joints.
-
-glTF's axes: Y up, forward +Z. Letters: `V` points, `F` triangles.
+Letters: `V` vertices or points, `F` triangles, `B` joints.
 """
 
 import dataclasses

@@ -1,14 +1,14 @@
 """Key poses of a motion: its cycle, the fewest poses for it, or those noted in the file.
 
-Letters: `F` frames, `J` joints, `N` evenly spaced samples of one cycle.
-
 The controller interpolates linearly from pose to pose (docs/reference/controller.md), so a cycle of
 poses is a sum of hat functions, and linear least squares gives the best poses of a given number.
-Letters: `N` samples of a cycle, `K` key poses, `C` poses of the whole cycle, `J` joints.
 
 A body never reaches its targets exactly: it lags, and bends under its weight. A cycle written by
 `mjxgait export` states both targets and motion; changes to the motion since then are added to the
-targets. Letters: `N` samples of a cycle, `K` key poses, `J` joints.
+targets.
+
+Letters: `F` frames, `J` joints, `N` evenly spaced samples of one cycle, `K` key poses, `C` poses of
+the whole cycle.
 """
 
 import dataclasses

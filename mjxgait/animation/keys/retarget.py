@@ -1,9 +1,8 @@
 """Retargeting of bone rotations to a creature's hinges: names, axes, and a least-squares fit.
 
 A bone at rest corresponds to a part in the creature's rest pose. From there both turn equally, each
-relative to the next matched part above it. Letters: `F` frames, `J` actuated joints.
-
-Letters: `F` frames, `B` bones. Axes are [3, 3], from the creature's world to the file's.
+relative to the next matched part above it. Axes are [3, 3], from the creature's world to the
+file's. Letters: `F` frames, `B` bones, `J` actuated joints.
 """
 
 import dataclasses

@@ -3,11 +3,9 @@
 A neuron has one number of memory. Inputs are clipped to ±`LOUDEST`, values to ±`MOST`, so that
 nothing overflows.
 
-Letters: `P` parts, `n` links, `Q` and `M` neurons as in `nerves`; `V` values: nothing (0), the
-constant 1, the angles, contacts and light of all links, and all neurons, part by part, the central
-ones last. A part's contact and light are those of the link that carries its block.
-
-Letters: `n` links, `K` neurons.
+Letters: `P` parts, `n` links, `K` neurons, `Q` and `M` as in `genotype`; `V` values: nothing (0),
+the constant 1, the angles, contacts and light of all links, and all neurons, part by part, the
+central ones last. A part's contact and light are those of the link that carries its block.
 """
 
 import jax

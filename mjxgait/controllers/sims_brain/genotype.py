@@ -1,9 +1,8 @@
 """Genotype of a body and its nerves: a graph, and neurons at its nodes.
 
 Letters: `N` nodes, `C` outgoing connections of each, `P` parts that may grow, `n` links
-(`physics.batched_trees`).
-
-Letters: `N` nodes, `Q` neurons of a node, `M` central ones; 3 inputs each, 3 effectors per node.
+(`physics.batched_trees`); `Q` neurons of a node, `M` central ones, with 3 inputs each, and 3
+effectors per node.
 """
 
 import dataclasses

@@ -1,6 +1,6 @@
 """Certified walks of a repertoire as clips with starts and stops, and a page that drives them.
 
-Both are simulated in C MuJoCo, undisturbed, and move their root as the body moved.
+Starts and stops are simulated in C MuJoCo, undisturbed, and move their root as the body moved.
 Letters: `S` ways to stop, `T` frames, `J` actuated joints.
 """
 

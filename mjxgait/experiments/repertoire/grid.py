@@ -1,7 +1,8 @@
 """Grid of requested walks: its cells, their settings, and their evolution.
 
-Each of the two is one program with a row per cell. In every generation a cell evaluates, among its
-offspring, one of the best individuals of each neighbour. Each cell has its own run folder.
+Walks straight ahead evolve first, turns from them: two programs with a row per cell. In every
+generation a cell evaluates, among its offspring, one of the best individuals of each neighbour.
+Each cell has its own run folder.
 """
 
 import dataclasses

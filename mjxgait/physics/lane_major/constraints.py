@@ -1,13 +1,11 @@
 """Contacts with the ground and joint limits as MuJoCo's soft constraints.
 
 Formulas: MuJoCo documentation, "Computation", sections "Constraint model" and "Contact", and MJX's
-constraint.py. Values of contacts are [C, L], of limits [M, L]; a contact's three directions are
-those of `frames`.
+constraint.py. Values of all contacts lie side by side in arrays [C, L], those of limits in [M, L].
 
 A contact of MuJoCo's pyramidal cone has four edges, normal plus or minus friction times each
-tangent. Here it is kept in its three directions (normal, first, second tangent). Edges are
-combinations of these, and friction enters late. Values of all contacts lie side by side in arrays
-[C, L], those of limits in [M, L]. Formulas: see `springs`.
+tangent. Here it is kept in its three directions (normal, first, second tangent; `footing.Frames`).
+Edges are combinations of these, and friction enters late.
 """
 
 import dataclasses

@@ -1,6 +1,4 @@
-"""Jacobian J of all contacts, never written out.
-
-Values are [C, L]; a contact's own directions are normal, first and second tangent.
+"""Axes of all contacts, and their Jacobian J, never written out.
 
 Each contact is a point of a body, and bodies move as the tree moves them. J x is the velocity of
 the points when x moves the tree: a sum down the tree. J^T f gathers the points' forces at their
@@ -8,8 +6,8 @@ bodies and sums them up the tree. J^T D J is the mass matrix's own recursion wit
 stiffness instead of inertia (Featherstone, "Rigid Body Dynamics Algorithms", chapter 6). So a
 further contact on a body costs a few dozen operations, however long its chain.
 
-Values of contacts are [C, L] along normal and two tangents; those of a body are [6, L], angular
-before linear, or [21, L].
+Values of contacts are [C, L] along normal, first and second tangent; those of a body are [6, L],
+angular before linear, or [21, L].
 """
 
 import dataclasses

@@ -1,4 +1,4 @@
-"""What is read from a MuJoCo model: its support, solver parameters, and merged fixed bodies.
+"""What a MuJoCo model contains for this step: supported elements, solver parameters, merged bodies.
 
 A body without a joint needs no place in the equations. Robots have many: sensors, rotors, feet.
 """

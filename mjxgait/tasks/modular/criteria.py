@@ -1,7 +1,5 @@
 """Acceptance criteria for modular bodies: swim, roam, jump, within physical limits.
 
-Letters: `T` frames.
-
 Letters: `T` frames, `P` spans of time.
 """
 

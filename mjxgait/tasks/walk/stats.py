@@ -1,6 +1,6 @@
 """Episode statistics of a walk: running sums for one creature, and those for walk targets.
 
-A phase is the middle of a foot's contact in cycles of the first foot, as in certification
+A footfall phase is the middle of a foot's contact in cycles of the first foot, as in certification
 (`certification.describe.footfall_phases`). A stance lasts from one swing to the next, because a
 foot may lose contact for a moment after it comes down.
 """
