@@ -227,3 +227,17 @@ def _called(model: mujoco.MjModel, geom: int) -> str:
         return f'geom "{name}"'
     body = model.body(model.geom_bodyid[geom]).name
     return f'a geom without name (number {geom}, in body "{body}")'
+
+
+def rotation(quat: np.ndarray) -> np.ndarray:
+    """Rotation [3, 3] of a quaternion [4] (w, x, y, z)."""
+    result = np.zeros(9)
+    mujoco.mju_quat2Mat(result, np.asarray(quat, float))
+    return result.reshape(3, 3)
+
+
+def quaternion(matrix: np.ndarray) -> np.ndarray:
+    """Quaternion [4] (w, x, y, z) of a rotation [3, 3]."""
+    result = np.zeros(4)
+    mujoco.mju_mat2Quat(result, np.ascontiguousarray(matrix, float).ravel())
+    return result

@@ -9,8 +9,9 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
+from mjxgait.creature.geometry import rotation
 from mjxgait.importer.drive import Drive
-from mjxgait.importer.parts import Notes, rotation
+from mjxgait.importer.parts import Notes
 from mjxgait.plugins import resolve_config
 
 SECONDS = 2.0

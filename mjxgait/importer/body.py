@@ -12,8 +12,9 @@ import numpy as np
 
 from mjxgait.creature import geometry
 from mjxgait.creature.creature import REST
+from mjxgait.creature.geometry import quaternion, rotation
 from mjxgait.errors import UserError
-from mjxgait.importer.parts import GEOM, Body, Shape, quaternion, rotation
+from mjxgait.importer.parts import GEOM, Body, Shape
 from mjxgait.importer.skeleton import foot_tips, tip_points
 
 KINDS = {

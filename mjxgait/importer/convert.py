@@ -11,6 +11,7 @@ import numpy as np
 
 from mjxgait.animation.clips.clip import ELSEWHERE
 from mjxgait.creature import geometry
+from mjxgait.creature.geometry import rotation
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import in_plane
 from mjxgait.importer.balance import steady_balance
@@ -24,7 +25,7 @@ from mjxgait.importer.orient import (
     is_planar,
     yaw_to,
 )
-from mjxgait.importer.parts import Notes, listed, one_line, plain_names, rotation
+from mjxgait.importer.parts import Notes, listed, one_line, plain_names
 from mjxgait.importer.rigged import RIGS, model_of
 from mjxgait.importer.skeleton import build_bodies
 from mjxgait.importer.source import Places, Source, parse_xml

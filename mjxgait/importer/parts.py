@@ -12,6 +12,8 @@ import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from mjxgait.creature.geometry import rotation
+
 Confidence = Literal["high", "medium", "low"]
 
 
@@ -139,20 +141,6 @@ class Body:
     inertia: np.ndarray
     joints: list[Joint]
     shapes: list[Shape]
-
-
-def rotation(quat: np.ndarray) -> np.ndarray:
-    """Rotation [3, 3] of a quaternion [4] (w, x, y, z)."""
-    result = np.zeros(9)
-    mujoco.mju_quat2Mat(result, np.asarray(quat, float))
-    return result.reshape(3, 3)
-
-
-def quaternion(matrix: np.ndarray) -> np.ndarray:
-    """Quaternion [4] (w, x, y, z) of a rotation [3, 3]."""
-    result = np.zeros(4)
-    mujoco.mju_mat2Quat(result, np.ascontiguousarray(matrix, float).ravel())
-    return result
 
 
 def read_shapes(model: mujoco.MjModel, body: int) -> list[Shape]:

@@ -7,19 +7,9 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
+from mjxgait.creature.geometry import quaternion, rotation
 from mjxgait.importer.anatomy import Anatomy
-from mjxgait.importer.parts import (
-    BALL,
-    HINGE,
-    Body,
-    Joint,
-    Notes,
-    Shape,
-    listed,
-    plain_names,
-    quaternion,
-    rotation,
-)
+from mjxgait.importer.parts import BALL, HINGE, Body, Joint, Notes, Shape, listed, plain_names
 
 MOST_RADIANS = 4 * np.pi
 """Limit in rad beyond which the file's value was meant in degrees."""

@@ -5,8 +5,8 @@ Letters: `J` active joints, `F` feet.
 
 import numpy as np
 
+from mjxgait.creature.geometry import quaternion, rotation
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.parts import quaternion, rotation
 from mjxgait.importer.skeleton import height_of
 from mjxgait.importer.soles import Stance
 

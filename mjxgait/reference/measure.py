@@ -1,4 +1,4 @@
-"""Measurements of a recorded trajectory for the criteria: contacts, slip, clearance, power, strides.
+"""Measurements of a recorded trajectory: contacts, slip, clearance, power, strides.
 
 Letters: `T` frames, `J` actuated joints, `N` feet, `B` bodies, `R` strides.
 """

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 
+from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.derived import SenseLayout
 
@@ -293,13 +294,13 @@ class Fused:
             centre = mass @ centres / mass.sum()
             tensor = np.zeros((3, 3))
             for b, m, c in zip(heavy, mass, centres - centre, strict=True):
-                axes = turn[b] @ _matrix(model.body_iquat[b])
+                axes = turn[b] @ geometry.rotation(model.body_iquat[b])
                 tensor += axes @ np.diag(model.body_inertia[b]) @ axes.T
                 tensor += m * (c @ c * np.eye(3) - np.outer(c, c))
             moments, axes = np.linalg.eigh(tensor)
             axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
             self.body_mass[i], self.body_ipos[i] = mass.sum(), centre
-            self.body_inertia[i], self.body_iquat[i] = moments, _quaternion(axes)
+            self.body_inertia[i], self.body_iquat[i] = moments, geometry.quaternion(axes)
 
 
 Model: TypeAlias = Any
@@ -352,22 +353,14 @@ def _carried(model: mujoco.MjModel, kept: np.ndarray) -> tuple[np.ndarray, np.nd
         parent = model.body_parentid[body]
         carrier[body] = carrier[parent]
         place[body] = place[parent] + turn[parent] @ model.body_pos[body]
-        turn[body] = turn[parent] @ _matrix(model.body_quat[body])
+        turn[body] = turn[parent] @ geometry.rotation(model.body_quat[body])
     return carrier, place, turn
 
 
 def _compose(turn: np.ndarray, quat: np.ndarray) -> np.ndarray:
     """Turn a quaternion; without a turn its numbers stay the same."""
-    return quat if np.array_equal(turn, np.eye(3)) else _quaternion(turn @ _matrix(quat))
-
-
-def _matrix(quat: np.ndarray) -> np.ndarray:
-    result = np.zeros(9)
-    mujoco.mju_quat2Mat(result, np.asarray(quat, float))
-    return result.reshape(3, 3)
-
-
-def _quaternion(matrix: np.ndarray) -> np.ndarray:
-    result = np.zeros(4)
-    mujoco.mju_mat2Quat(result, np.ascontiguousarray(matrix, float).ravel())
-    return result
+    return (
+        quat
+        if np.array_equal(turn, np.eye(3))
+        else geometry.quaternion(turn @ geometry.rotation(quat))
+    )
