@@ -2,8 +2,9 @@
 
 `python scripts/plant_faults.py [NAME ...]`: every fault, or those named. Each is planted in a copy
 of the tree, never in the checkout. The tests named for it run first; if they pass, the other quick
-tests run. Needs no network. Exits with 1 when a fault is not caught, or when its old text does not
-occur exactly once. docs/testing.md describes its purpose.
+tests run. A test that fails with the fault runs again without it: if it fails then too, it has
+caught nothing. Needs no network. Exits with 1 when a fault is not caught, or when its old text does
+not occur exactly once. docs/testing.md describes its purpose.
 """
 
 import argparse
@@ -18,8 +19,9 @@ import sys
 import tempfile
 import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 LIST = ROOT / "tests" / "faults.toml"
@@ -29,6 +31,10 @@ AT_THE_TOP = ("build", "dist", "runs")
 LONGEST = 900
 """Time limit of a test run in seconds; a fault that makes tests hang counts as not caught."""
 FAILURE = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
+LONGEST_REASON = 120
+"""Characters of an assertion in the table."""
+ROW = re.compile(r"\| (?!fault \|)\S.* \|$")
+REASON = re.compile(r"^E +(\S.*)$", re.MULTILINE)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,11 +55,15 @@ class Fault:
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """Result of a fault. caught_by: the first test that failed, None where all passed."""
+    """Result of a fault.
+
+    caught_by: the first test that failed, None where all passed. reason: its assertion or exception.
+    """
 
     fault: Fault
     caught_by: str | None
     seconds: float
+    reason: str = ""
     trouble: str = ""
 
 
@@ -113,19 +123,30 @@ def copied(root: Path) -> Iterator[Path]:
 
 
 def examine(fault: Fault, root: Path, cache: Path) -> Finding:
-    """Plant one fault in a copy of a tree and run tests until one fails."""
+    """Plant one fault in a copy of a tree and run tests until one fails because of it."""
     begin, text = time.monotonic(), planted(fault, root)
+
+    def finding(**result: Any) -> Finding:
+        return Finding(fault, seconds=time.monotonic() - begin, **{"caught_by": None, **result})
+
     with copied(root) as tree:
+        sound = (tree / fault.file).read_text(encoding="utf-8")
         (tree / fault.file).write_text(text, encoding="utf-8")
         for arguments in (fault.tests, ("-m", "not slow")):
             status, output = run_tests(tree, arguments, cache)
+            if status == 0:
+                continue
             failed = FAILURE.search(output)
-            seconds = time.monotonic() - begin
-            if status == 1 and failed:
-                return Finding(fault, failed.group(1), seconds)
-            if status != 0:
-                return Finding(fault, None, seconds, f"status {status}: {output[-2000:]}")
-    return Finding(fault, None, seconds)
+            if status != 1 or not failed:
+                return finding(trouble=f"status {status}: {output[-2000:]}")
+            (tree / fault.file).write_text(sound, encoding="utf-8")
+            again, output_again = run_tests(tree, (failed.group(1),), cache)
+            if again != 0:
+                said = f"{failed.group(1)} fails without the fault too: {output_again[-2000:]}"
+                return finding(trouble=said)
+            reason = REASON.search(output)
+            return finding(caught_by=failed.group(1), reason=reason.group(1) if reason else "")
+    return finding()
 
 
 def check_sound(faults: list[Fault], root: Path, cache: Path) -> None:
@@ -137,14 +158,24 @@ def check_sound(faults: list[Fault], root: Path, cache: Path) -> None:
         sys.exit(f"the tests fail without a fault, with status {status}:\n{output[-3000:]}")
 
 
-def table(findings: list[Finding]) -> str:
-    """Return a Markdown table: every fault, its effect, and the test that caught it."""
-    lines = ["| fault | where | what goes wrong | caught by |", "|---|---|---|---|"]
+HEAD = "| fault | where | what goes wrong | caught by | assertion |\n|---|---|---|---|---|"
+
+
+def table(findings: list[Finding], text: str = "", order: Sequence[str] = ()) -> str:
+    """Return a Markdown table: each fault, its effect, the test that caught it and how it failed.
+
+    text, order: a page with such a table, of which all other lines are kept, and the faults' names
+    in the order of its rows.
+    """
+    rows = {line[2:].partition(" | ")[0]: line for line in text.splitlines() if ROW.match(line)}
     for finding in findings:
         fault, caught = finding.fault, f"`{finding.caught_by}`" if finding.caught_by else "nothing"
-        where = fault.file.removeprefix("mjxgait/")
-        lines.append(f"| {fault.name} | `{where}` | {fault.why} | {caught.replace('|', ' ')} |")
-    return "\n".join(lines)
+        reason = f"`{finding.reason[:LONGEST_REASON]}`" if finding.reason else ""
+        cells = (fault.name, f"`{fault.file.removeprefix('mjxgait/')}`", fault.why, caught, reason)
+        rows[fault.name] = f"| {' | '.join(cell.replace('|', ' ') for cell in cells)} |"
+    names = [name for name in order if name in rows] or list(rows)
+    before = text.partition(HEAD)[0] if HEAD in text else ""
+    return "\n".join([before + HEAD, *(rows[name] for name in names)])
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -155,7 +186,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--root", type=Path, default=ROOT, help="the tree to plant them in")
     parser.add_argument("--jobs", type=int, default=1, help="faults at the same time")
     parser.add_argument("--trust", action="store_true", help="that tests pass without a fault")
-    parser.add_argument("--table", type=Path, help="file for the final table")
+    parser.add_argument("--table", type=Path, help="page whose rows of these faults are rewritten")
     told = parser.parse_args(arguments)
     known = read_faults(told.list)
     if unknown := set(told.names) - {fault.name for fault in known}:
@@ -170,10 +201,11 @@ def main(arguments: list[str] | None = None) -> int:
         if not told.trust:
             check_sound(faults, told.root, Path(folder))
         findings = _examine_all(faults, told.root, Path(folder), told.jobs)
-    text = table(findings)
-    print(f"\n{text}")
+    print(f"\n{table(findings)}")
     if told.table:
-        told.table.write_text(text + "\n", encoding="utf-8")
+        old = told.table.read_text(encoding="utf-8") if told.table.exists() else ""
+        page = table(findings, old, [fault.name for fault in known])
+        told.table.write_text(page + "\n", encoding="utf-8")
     caught = sum(finding.caught_by is not None for finding in findings)
     print(f"\n{caught} of {len(findings)} caught")
     return 0 if caught == len(findings) else 1

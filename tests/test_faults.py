@@ -32,10 +32,11 @@ def test_the_list_is_long_and_names_each_fault_once():
 
 
 def test_the_docs_say_who_catches_each():
-    """A row for each in docs/testing.md, with the file that it is in, and how many there are."""
+    """A row for each in docs/research/faults.md, with its file; docs/testing.md has their number."""
+    rows = (ROOT / "docs" / "research" / "faults.md").read_text(encoding="utf-8")
     text = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
     places = {name: fault.file.removeprefix("mjxgait/") for name, fault in FAULTS.items()}
-    missing = [name for name, place in places.items() if f"| {name} | `{place}` | " not in text]
+    missing = [name for name, place in places.items() if f"| {name} | `{place}` | " not in rows]
     assert not missing
     assert f"All {len(FAULTS)} are caught" in text
 
@@ -92,13 +93,31 @@ def test_it_names_the_test_that_catches_a_fault(tmp_path: Path, capsys: pytest.C
     assert script.main(planting(tmp_path, CAUGHT, BY_THE_REST)) == 0
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
     assert len(rows) == 3
-    assert all("`tests/test_toy.py::test_double`" in row for row in rows[1:])
+    assert all("`tests/test_toy.py::test_double` | `assert " in row for row in rows[1:])
     assert (tmp_path / "tree" / "toy.py").read_text() == TOY["toy.py"]
 
 
 def test_it_fails_when_nothing_catches_a_fault(tmp_path: Path, capsys: pytest.CaptureFixture):
     assert script.main(planting(tmp_path, MISSED)) == 1
     assert "0 of 1 caught" in capsys.readouterr().out
+
+
+def test_a_test_that_fails_anyway_has_caught_nothing(tmp_path: Path, capsys: pytest.CaptureFixture):
+    """It is not named for a fault, so the first run without one leaves it out."""
+    arguments = planting(tmp_path, MISSED)
+    (tmp_path / "tree/tests/test_rest.py").write_text("def test_nothing():\n    assert False\n")
+    assert script.main(arguments) == 1
+    said = capsys.readouterr().out
+    assert "fails without the fault too" in said
+    assert "0 of 1 caught" in said
+
+
+def test_a_page_keeps_its_other_rows(tmp_path: Path):
+    found = script.Finding(script.Fault("b", "mjxgait/x.py", "", "", (), "w"), "t::u", 1.0, "E | 1")
+    page = f"# Title\n\n{script.HEAD}\n| c | `y.py` | v | `t` | |\n| b | `x.py` | old | `t` | |\n"
+    lines = script.table([found], page, ["b", "c"]).splitlines()
+    assert lines[0] == "# Title"
+    assert lines[-2:] == ["| b | `x.py` | w | `t::u` | `E   1` |", "| c | `y.py` | v | `t` | |"]
 
 
 def test_it_refuses_a_fault_whose_text_is_gone(tmp_path: Path):

@@ -158,6 +158,28 @@ def test_mutation_never_leaves_the_box():
     assert inside(mutated(EvolutionConfig(sigma=3.0, tuning_rate=1.0, tuning_sigma=3.0), BOX.high))
 
 
+TWINS = Box({"a": jnp.zeros(50), "b": jnp.zeros(50)}, {"a": jnp.ones(50), "b": jnp.ones(50)})
+"""Two arrays of one shape and range."""
+
+
+@pytest.mark.parametrize("draw", [variation.uniform, variation.latin_hypercube])
+def test_arrays_of_one_shape_are_drawn_apart(draw):
+    drawn = draw(key_of(3), TWINS, 4)
+    assert float(jnp.mean(drawn["a"] == drawn["b"])) < 0.1
+
+
+def test_arrays_of_one_shape_are_varied_apart():
+    """Crossover takes other genes in each, and mutation moves others."""
+    operators = variation.real_variation(TWINS, EvolutionConfig())
+    child = operators.cross(key_of(4), TWINS.low, TWINS.high)
+    assert 0.2 < float(jnp.mean(child["a"] == child["b"])) < 0.8
+    middle = jax.tree.map(lambda leaf: leaf + 0.5, TWINS.low)
+    mutant = operators.mutate(key_of(5), middle)
+    moved = mutant["a"] != 0.5
+    assert bool(moved.any())
+    assert not bool((mutant["a"] == mutant["b"])[moved].any())
+
+
 def test_duplicates_are_all_but_the_first_of_equal_genomes():
     rows = jnp.array([[1.0, 2], [3, 4], [1, 2], [1, 2.0001], [3, 4], [1, 2]])
     assert first_occurrence({"a": rows[:, :1], "b": rows[:, 1:]}).tolist() == [

@@ -95,7 +95,8 @@ LINE |= {"generation": 3, "unique": 4, "forced": False, "wall_s": 2.0, "worst": 
 def test_their_line_counts_all_and_has_the_best_ones_terms():
     one = LINE | {"best": 1.0, "mean": 0.0, "term_slip": 0.1}
     other = LINE | {"best": 2.0, "mean": 1.0, "term_slip": 0.2, "forced": True, "wall_s": 4.0}
-    line = together([one, other], 4.0)
+    line = together([one, other | {"worst": -7.0}], 4.0)
+    assert line["worst"] == -7.0
     assert (line["best"], line["term_slip"], line["island"]) == (2.0, 0.2, 1)
     assert (line["mean"], line["sim_steps"], line["forced"]) == (0.5, 20, True)
     assert (line["wall_s"], line["steps_per_second"]) == (4.0, 5)

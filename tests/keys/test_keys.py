@@ -2,11 +2,13 @@
 
 import dataclasses
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pygltflib as gltf
 import pytest
+from helpers import STOOL
 from keys.made import PERIOD, RATE, bvh, columns, poses, swings, write
 from viewing.made_up import treading
 
@@ -74,6 +76,18 @@ def test_a_bone_turned_in_the_file_turns_the_joint_as_far(stool: Creature, tmp_p
     change = np.degrees(after.track.angles - before.track.angles)
     assert change[:, 1] == pytest.approx(10.0, abs=0.1)
     assert np.delete(change, 1, axis=1) == pytest.approx(0.0, abs=0.1)
+
+
+def test_joints_whose_drawn_pose_is_not_their_zero_come_back(stool: Creature, tmp_path: Path):
+    """MuJoCo's `ref`: the angle that the pose in the file is called."""
+    folder = shutil.copytree(STOOL, tmp_path / "offset")
+    xml = (folder / "creature.xml").read_text()
+    xml = xml.replace('name="front_left_hip"', 'name="front_left_hip" ref="0.3"')
+    (folder / "creature.xml").write_text(xml.replace("1 0 0 0 0 0 0 0", "1 0 0 0 0.3 0 0 0"))
+    offset = load_creature(folder)
+    angles = swings(offset)[::4]
+    brought = bring(offset, write(tmp_path, "bvh", offset, angles), tolerance=LOOSE)
+    assert worst(brought.track.angles, angles) < 0.05
 
 
 def test_what_a_joint_cannot_do_is_told(stool: Creature, tmp_path: Path):

@@ -11,6 +11,7 @@ from viewing.made_up import falling, treading
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
+from mjxgait.experiments.repertoire import neighbours
 from mjxgait.experiments.repertoire.found import Found
 from mjxgait.experiments.repertoire.neighbours import (
     MOMENTS,
@@ -85,9 +86,12 @@ def test_a_change_succeeds_where_the_new_speed_is_held(stool: Creature):
     assert not succeeds(stool, before, walking_at(stool, after, share=1.3)).any()
 
 
-def test_who_falls_has_not_changed(stool: Creature):
+def test_who_falls_has_not_changed(stool: Creature, monkeypatch: pytest.MonkeyPatch):
+    """Even if it falls at the new speed and heading."""
     before = walking_at(stool, treading(stool, LARGE))
     fallen = dataclasses.replace(falling(stool), wish=before.wish)
+    monkeypatch.setattr(neighbours, "_as_told", lambda *_: np.ones(MOMENTS, bool))
+    assert succeeds(stool, before, before).all()
     assert not succeeds(stool, before, fallen).any()
 
 
