@@ -1,0 +1,98 @@
+"""The task `turn`: what an episode counts, and its fitness terms, in JAX."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+from typing_extensions import override
+
+from mjxgait.config.tables import STRICT, Positive
+from mjxgait.tasks.base import Tally, positive_work
+from mjxgait.tasks.plain import PlainTask
+from mjxgait.types import Sensed, pytree
+
+
+@dataclasses.dataclass(frozen=True)
+class TurnSettings:
+    """Keys of `[fitness]`. rate: deg/s to the left that earn the whole term `turned`."""
+
+    __pydantic_config__ = STRICT
+    rate: Positive = 60.0
+
+
+@pytree
+class TurnTally(Tally):
+    """Statistics of an episode.
+
+    turned: [] rad to the left. work: [] J of the joints. away: [] m s, the distance from the start
+    summed over time. start: [2] m, place of the trunk at the first step.
+    """
+
+    turned: jax.Array
+    work: jax.Array
+    away: jax.Array
+    start: jax.Array
+
+
+class Turn(PlainTask):
+    """Turn to the left as fast as wanted, near the start, and stay up."""
+
+    Settings = TurnSettings
+    counts: ClassVar[Mapping[str, float]] = {
+        "alive": 1.0,
+        "turned": 3.0,
+        "away": -1.0,
+        "work": -0.05,
+    }
+    outcomes = ("seconds", "turned", "away")
+
+    @override
+    def init(self) -> TurnTally:
+        none, zero = jnp.zeros((), jnp.int32), jnp.zeros(())
+        return TurnTally(
+            steps=none,
+            reason=none,
+            overlap=zero,
+            turned=zero,
+            work=zero,
+            away=zero,
+            start=jnp.zeros(2),
+        )
+
+    @override
+    def update(
+        self, tally: TurnTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+    ) -> TurnTally:
+        place = sensed.trunk_pos[:2]
+        start = jnp.where(tally.steps == 0, place, tally.start)
+        return dataclasses.replace(
+            tally,
+            steps=tally.steps + 1,
+            turned=tally.turned + sensed.trunk_angvel[2] * self.step,
+            work=tally.work + positive_work(torque, sensed, self.step),
+            away=tally.away + jnp.linalg.norm(place - start) * self.step,
+            start=start,
+        )
+
+    @override
+    def judge(self, tally: TurnTally, settings: TurnSettings) -> Mapping[str, jax.Array]:
+        seconds, frame = self.horizon * self.step, self.creature.frame
+        rate = jnp.degrees(tally.turned) / seconds
+        weight_lifted = frame.mass * 9.81 * frame.hip_height * seconds
+        return {
+            "alive": tally.steps / self.horizon,
+            "turned": jnp.clip(rate / settings.rate, -1.0, 1.0),
+            "away": tally.away / (frame.hip_height * seconds),
+            "work": tally.work / weight_lifted,
+        }
+
+    @override
+    def outcome(self, tally: TurnTally) -> Mapping[str, jax.Array]:
+        seconds = tally.steps * self.step
+        return {
+            "seconds": seconds,
+            "turned": tally.turned,
+            "away": tally.away / jnp.maximum(seconds, self.step),
+        }
