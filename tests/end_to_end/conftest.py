@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from end_to_end.unevolved import Unevolved, unevolved
+from end_to_end.unevolved import Unevolved, unevolved, untried
 from end_to_end.walks import SHORTER
 
 import mjxgait.processes
@@ -21,24 +21,30 @@ from mjxgait.certification import CertificateConfig
 from mjxgait.certification.stress import StressConfig
 from mjxgait.cli import main
 from mjxgait.config.tables import build
+from mjxgait.creature import overlap
 from mjxgait.distributed import evolve as board
 from mjxgait.distributed.recipe import Programs
 from mjxgait.distributed.scheduler import LocalBackend
-from mjxgait.experiments.ablation import rows
+from mjxgait.experiments.ablation import findings, rows
 from mjxgait.training import loop
+from mjxgait.training.prescreen import Tryout
 
-COMPILED, CERTIFICATE = loop._compiled, CertificateConfig.__init__
+CERTIFICATE = CertificateConfig.__init__
 PROGRAMS = Programs()
 """Of all studies and sets of runs: those of the same shape share one."""
 
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The code of an examination is as shipped; its defaults are few starts and short times."""
+    """The code of an examination is as shipped; its defaults are few starts and short times.
+
+    So are those of the report of a study: few resamples.
+    """
     _default(monkeypatch, CertificateConfig, build(CertificateConfig, SHORTER, "short"))
     _default(monkeypatch, StressConfig, StressConfig(starts=4, seconds=1.0, long=2.0))
     monkeypatch.setattr(rows, "SECONDS", 0.5)
     monkeypatch.setattr(rows, "STARTS", 2)
+    monkeypatch.setattr(findings, "RESAMPLES", 499)
     for module in (mjxgait.processes, rows):
         monkeypatch.setattr(module, "process_per_core", _one_thread)
     monkeypatch.setattr(subprocess, "run", _run_here(subprocess.run))
@@ -46,17 +52,22 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 @pytest.fixture(autouse=True)
-def sketched(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def sketched(request: pytest.FixtureRequest) -> Iterator[pytest.MonkeyPatch]:
     """Let generations pass without a simulation, unless `--thorough` is given."""
-    if not request.config.getoption("--thorough"):
-        monkeypatch.setattr(loop, "_compiled", unevolved)
-        monkeypatch.setattr(board, "LocalBackend", partial(Unevolved, PROGRAMS))
+    with pytest.MonkeyPatch.context() as patch:
+        if not request.config.getoption("--thorough"):
+            patch.setattr(loop, "_compiled", unevolved)
+            patch.setattr(board, "LocalBackend", partial(Unevolved, PROGRAMS))
+            patch.setattr(Tryout, "begin", lambda tryout: None)
+            patch.setattr(Tryout, "_program", property(untried))
+            patch.setattr(overlap, "SAMPLES", 16)
+        yield patch
 
 
 @pytest.fixture
-def evolving(sketched: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def evolving(sketched: pytest.MonkeyPatch, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compile and simulate generations as shipped."""
-    monkeypatch.setattr(loop, "_compiled", COMPILED)
+    sketched.undo()
     monkeypatch.setattr(board, "LocalBackend", partial(LocalBackend, PROGRAMS))
 
 

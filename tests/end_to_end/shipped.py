@@ -36,6 +36,10 @@ TINY = (
     *("--examination.candidates", "1", "--examination.draws", "2"),
 )
 """Options of `train` that make a run of seconds of any configuration; nothing else is changed."""
+FEW_STARTS = ("--rollout.variety", "2")
+"""The same for a configuration that draws other starts in each generation: uneven ground is laid for
+each of them.
+"""
 FEW_BLOCKS = (
     *("--controller.nodes", "3", "--controller.parts", "3", "--controller.links", "4"),
     *("--fitness.settle", "0.1"),
@@ -65,7 +69,9 @@ class Way:
         given = {"env": self.creature, "task": self.task, "config": self.config}
         given["style"] = self.style
         words = [w for key, value in given.items() if value for w in (f"--{key}", value)]
-        return [*words, *(FEW_BLOCKS if creature_of(self.creature).settings.creature.grows else ())]
+        few = FEW_BLOCKS if creature_of(self.creature).settings.creature.grows else ()
+        rollout = read_config(self.config).get("rollout", {}) if self.config else {}
+        return [*words, *few, *(FEW_STARTS if rollout.get("variety", 1) > 1 else ())]
 
 
 @functools.cache

@@ -47,7 +47,7 @@ def examined(folder: Path) -> tuple[list[str], str]:
 
 
 def gathered(folder: Path) -> tuple[list[str], str]:
-    given = ["--env", str(STOOL), "--speeds", "0.2", "0.4", "--turns", "10"]
+    given = ["--env", str(STOOL), "--speeds", "0.3", "--turns", "10"]
     given += ["--config", small_settings(folder), "--generations", "1", "--out", "set"]
     return given, "set/map.png"
 

@@ -106,6 +106,7 @@ LONG = (
     "accelerator.py",
     "blocks.py",
     "bodies.py",
+    "contacts.py",
     "ground.py",
     "islands.py",
     "keyed.py",
@@ -145,7 +146,7 @@ def as_it_was():
                 setattr(place, name, value)
 
 
-COMPILES = pytest.mark.thorough("compiles for half a minute")
+COMPILES = pytest.mark.thorough("compiles for up to half a minute; what it runs has own tests")
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ import pytest
 from end_to_end.shipped import (
     CONFIGS,
     CREATURES,
+    FEW_STARTS,
     ROOT,
     STYLES,
     TASKS,
@@ -50,9 +51,12 @@ TRAINED = {
     "limbo": "tests/test_limbo.py",
     "swim": "tests/blocks/test_swimming.py",
     "follow-on-land": "tests/blocks/test_roaming.py",
+    **dict.fromkeys(("jump", "follow"), "tests/blocks/test_roaming.py"),
     "travel": "tests/test_travel.py",
 }
-"""Tasks that another test evolves or, of travel, runs against the examiner; and where."""
+"""Tasks that another test evolves, and where. Of the last three that test compares parts with the
+examiner; `--thorough` evolves them.
+"""
 EVOLVED = [way for way in first_of_each_task(WAYS) if task_of(way) not in TRAINED]
 
 
@@ -137,10 +141,16 @@ def test_every_file_of_configurations_is_one():
 
 WALKERS = [name for name in CREATURES if use_of(name).controller == "poses"]
 OF_POSES = [name for name in CONFIGS if read_config(name).get("use", {}) == {}]
+UNTRAINED = [
+    (config, name)
+    for config in OF_POSES
+    for name in WALKERS
+    if Way(name, config=config) not in WAYS
+]
+"""Configurations and walkers that `test_a_training_ends_with_a_certificate` does not put together."""
 
 
-@pytest.mark.parametrize("name", WALKERS)
-@pytest.mark.parametrize("config", OF_POSES)
+@pytest.mark.parametrize(("config", "name"), UNTRAINED)
 def test_every_walker_can_be_examined_under_every_configuration(
     config: str, name: str, tmp_path: Path
 ):
@@ -156,7 +166,7 @@ def test_every_walker_can_be_examined_under_every_configuration(
     write_champion(made, creature, folder / CHAMPION)
     body, champion = open_champion(folder)
     assert champion.fingerprint == made.fingerprint
-    assert nominal_check(body, champion, CertificateConfig(seconds=1.0, warmup=0.2)).criteria
+    assert nominal_check(body, champion, CertificateConfig(seconds=0.6, warmup=0.2)).criteria
 
 
 VARIANTS = {
@@ -168,7 +178,7 @@ VARIANTS = {
         *("--controller.initial-depth", "2", "4"),
     ),
     "another way, scaled, on other ground": (
-        *("--way", "back", "--scale", "front*=1.1", "--ground", "rough:0.03"),
+        *("--way", "back", "--scale", "front*=1.1", "--ground", "rough:0.03", *FEW_STARTS),
     ),
 }
 """What changes the creature, or the simulator, before the examiner sees the champion."""

@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 from collections.abc import Callable
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import jax
@@ -19,6 +20,7 @@ from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.training.checkpoint import pack
 from mjxgait.training.experiment import Experiment
+from mjxgait.training.prescreen import Tryout
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 
@@ -47,12 +49,28 @@ def embodied(experiment: Experiment) -> EvolutionState:
     raise AssertionError("none of the first population can move")
 
 
+def untried(tryout: Tryout) -> Callable[..., SimpleNamespace]:
+    """Stand in for `Tryout._program`: made-up outcomes, and no program is compiled."""
+    names = tryout._trials.simulator.task.outcomes
+
+    def judged(numbers: Any, settings: Any, starts: Any, genomes: Any) -> SimpleNamespace:
+        individuals, trials = (jax.tree.leaves(rows)[0].shape[1] for rows in (genomes, starts))
+        outcome = np.broadcast_to(_made_up(len(names)), (1, individuals, trials, len(names)))
+        return SimpleNamespace(outcome=outcome)
+
+    return judged
+
+
+def _made_up(count: int) -> np.ndarray:
+    """Outcomes of which none is zero and no two are equal: some are divided by a difference."""
+    return 0.25 + 0.01 * np.arange(count, dtype=np.float32)
+
+
 def generation(
     state: EvolutionState, follows: bool = False
 ) -> tuple[EvolutionState, GenerationMetrics]:
     """Return the same population, one generation later, and metrics of ones."""
-    # None is zero and no two are equal: some are divided by each other's difference.
-    outcomes = 0.25 + 0.01 * jnp.arange(state.outcome.shape[-1])
+    outcomes = _made_up(state.outcome.shape[-1])
     later = dataclasses.replace(
         state,
         terms=jnp.zeros_like(state.terms),

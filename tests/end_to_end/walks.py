@@ -28,11 +28,13 @@ candidates = 1
 draws = 2
 """
 
-SHORTER = tomllib.loads(SHORT) | {
-    **{"seconds": 2.0, "warmup": 0.3},
+_KNOWN = tomllib.loads(SHORT)
+SHORTER = _KNOWN | {
+    **{"seconds": 1.2, "warmup": 0.3},
+    "pushes": _KNOWN["pushes"] | {"window": [0.4, 0.6], "ladder_seconds": 0.5},
     **{"hop": {"stay": 0.5}, "limbo": {"stay": 0.5}},
 }
-"""An examination of 2 s; a lamp is to be at rest for half a second at its end."""
+"""An examination of 1.2 s; a lamp is to be at rest for half a second at its end."""
 
 
 @functools.cache
