@@ -6,10 +6,12 @@ compiles nothing anew, except a weight marked `SHAPE`: its zero removes a term.
 """
 
 import dataclasses
+import functools
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import HOST, KIND, SHAPE
@@ -20,7 +22,7 @@ from mjxgait.types import pytree
 class Choice:
     """One of several named options in the compiled program. index: []."""
 
-    index: jax.Array
+    index: jax.Array | np.int32
     options: tuple[str, ...] = dataclasses.field(metadata={"static": True})
 
 
@@ -48,7 +50,7 @@ def traced(config: Config) -> Config:
 
 def _traced(config: Any) -> Any:
     values = {}
-    for field, hint, role in _fields(type(config)):
+    for field, hint, role in _fields(type(config)):  # type: ignore[arg-type]  # types are hashable
         value = getattr(config, field.name)
         if dataclasses.is_dataclass(value):
             values[field.name] = _traced(value)
@@ -68,14 +70,15 @@ def _traced(config: Any) -> Any:
 
 def _leaf(value: Any, hint: Any) -> Any:
     if isinstance(value, tuple):
-        return tuple(jnp.float32(end) for end in value)
+        return tuple(np.float32(end) for end in value)
     if isinstance(value, str):
         options = get_args(hint)
-        return Choice(jnp.int32(options.index(value)), options)
+        return Choice(np.int32(options.index(value)), options)
     plain = get_args(hint)[0] if hasattr(hint, "__metadata__") else hint
-    return jnp.asarray(value, {bool: jnp.bool_, int: jnp.int32}.get(plain, jnp.float32))
+    return {bool: np.bool_, int: np.int32}.get(plain, np.float32)(value)
 
 
+@functools.cache
 def _fields(cls: type) -> list[tuple[Any, Any, str]]:
     """Return each field of a config class with its type and role.
 

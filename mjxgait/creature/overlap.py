@@ -8,6 +8,7 @@ Letters: `S` bars, `Q` pairs of bars.
 import collections
 import dataclasses
 import functools
+import hashlib
 from typing import Any
 
 import mujoco
@@ -89,7 +90,35 @@ def bar_distance(
 
 
 def find_crossings(creature: Creature) -> Crossings:
-    """Pairs of bars that come near each other in the pose ranges; deterministic."""
+    """Pairs of bars that come near each other in the pose ranges; deterministic.
+
+    The search takes up to half a second, so the latest results are kept.
+    """
+    key = _search_key(creature)
+    if key not in _KEPT:
+        if len(_KEPT) == MOST_KEPT:
+            del _KEPT[next(iter(_KEPT))]
+        _KEPT[key] = _search(creature)
+    return _KEPT[key]
+
+
+_KEPT: dict[bytes, Crossings] = {}
+MOST_KEPT = 32
+
+
+def _search_key(creature: Creature) -> bytes:
+    """Hash of all that the search reads."""
+    model = np.zeros(mujoco.mj_sizeModel(creature.model), np.uint8)
+    mujoco.mj_saveModel(creature.model, None, model)
+    joints, planar = creature.joints, creature.settings.creature.planar
+    ranges = (joints.low, joints.high, joints.pose_low, joints.pose_high, joints.qpos_adr)
+    text = f"{creature.frame.hip_height} {planar} {SAMPLES}".encode()
+    return hashlib.sha256(
+        text + b"".join(array.tobytes() for array in (model, creature.stand_qpos, *ranges))
+    ).digest()
+
+
+def _search(creature: Creature) -> Crossings:
     model, data = creature.model, mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(model, data)

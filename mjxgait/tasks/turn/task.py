@@ -16,7 +16,11 @@ from mjxgait.types import Sensed, pytree
 
 @dataclasses.dataclass(frozen=True)
 class TurnSettings:
-    """Keys of `[fitness]`. rate: deg/s to the left that earn the whole term `turned`."""
+    """Keys of `[fitness]`.
+
+    Attributes:
+      rate: Turn to the left in deg/s that earns the whole term `turned`.
+    """
 
     __pydantic_config__ = STRICT
     rate: Positive = 60.0
