@@ -74,6 +74,9 @@ FORMS: dict[str, Given] = {
         *("--files", str(STOOL / "creature.xml"), "--out", "out", "--", *TINY)
     ],
     "inspect_seconds.py": lambda folder: [str(trained(folder / "run")), "--times", "1"],
+    "interruptions.py": lambda folder: [
+        *("--commands", "certify", "--kills", "1", "--stops", "0", "--no-conditions")
+    ],
     "islands.py": lambda folder: [
         *("islands.json", *STOOLS, "--seeds", "2", "--population", "16"),
         *("--generations", "2", "--seconds", "0.3"),
@@ -108,6 +111,7 @@ LONG = (
     "bodies.py",
     "contacts.py",
     "ground.py",
+    "interruptions.py",
     "islands.py",
     "keyed.py",
     "raise.py",
