@@ -32,6 +32,7 @@ ELSEWHERE = {
     "blender.py": BLENDER,
     "cluster.py": RAY,
     "cluster_faults.py": RAY,
+    "fuzz_readers.py": "needs atheris; tests/keys/test_hostile_keys.py and tests/importing/test_fuzz.py change files too",
     "plant_faults.py": "tests/test_faults.py runs it on a tree of its own",
 }
 """What is not run here, and why."""
