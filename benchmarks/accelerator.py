@@ -32,9 +32,9 @@ import sys
 import time
 from pathlib import Path
 from statistics import mean
-from typing import Any
+from typing import Any, Literal
 
-ENGINES = {"ours": "auto", "mjx": "mjx"}
+ENGINES: dict[str, Literal["auto", "mjx"]] = {"ours": "auto", "mjx": "mjx"}
 """Engines, and their names in `rollout.physics`."""
 INDIVIDUALS = 64
 """Different individuals; further lanes repeat them."""

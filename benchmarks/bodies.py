@@ -31,7 +31,7 @@ from mjxgait.controllers import spd
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import make_plant
 from mjxgait.training.stages import prepare_devices
-from mjxgait.types import BodyState, Plant, Sensed
+from mjxgait.types import BodyState, ModelPlant, Plant, Sensed
 
 LANES = 64
 STEPS = 400
@@ -90,7 +90,7 @@ def measure(env: str, rounds: int) -> list[dict[str, Any]]:
 
 
 def build(
-    creature: Creature, plant: Plant, numbers: Any, every: Any
+    creature: Creature, plant: ModelPlant, numbers: Any, every: Any
 ) -> tuple[Callable[[], jax.Array], float]:
     """Return a pass of so many steps, and s to compile it.
 
@@ -122,7 +122,7 @@ def follow(creature: Creature, plant: Plant, state: BodyState) -> tuple[BodyStat
     """Return the state after a step of stable PD towards standing, and what was sensed before."""
     step = float(creature.model.opt.timestep)
     kp, kd, limit, goal = (
-        np.float32(x)[:, None]
+        jnp.asarray(x, jnp.float32)[:, None]
         for x in (
             creature.gains.kp,
             creature.gains.kd,

@@ -25,7 +25,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
 
@@ -42,9 +42,15 @@ from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.rows import Blocks
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.plugins import resolve_config
+from mjxgait.simulation.evaluator import Evaluator
+from mjxgait.tasks.starts import Starts
 from mjxgait.training.checkpoint import Checkpoints, pack
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.stages import prepare_devices
+from mjxgait.types import Asked, Judged
+
+if TYPE_CHECKING:
+    from mjxgait.distributed.ray_backend import RayBackend
 
 SIZES = (64, 256, 1024, 4096)
 """Individuals per chunk; the population has the largest size."""
@@ -82,8 +88,9 @@ class Clock:
 
     def all(self, work: Iterable[tuple[Recipe, Job]]) -> list[Any]:
         found = self.scheduler.all((recipe, Clocked(job)) for recipe, job in work)
-        self.processor += sum(seconds for _, seconds in found)
-        return [result for result, _ in found]
+        done = found or []
+        self.processor += sum(seconds for _, seconds in done)
+        return [result for result, _ in done]
 
 
 def main() -> None:
@@ -148,7 +155,7 @@ def blocks(scheduler: Scheduler, options: argparse.Namespace) -> dict[str, Any]:
     creature, config = subject(options, 512)
     experiment = build_experiment(creature, config)
     clock = Clock(scheduler)
-    step = experiment.compile(Blocks(clock, creature, config))
+    step = experiment.compile(Blocks(cast(Scheduler, clock), creature, config))
     begun = experiment.place(experiment.init())
     for machine in (0, 1):
         with one_of(scheduler, machine):
@@ -226,7 +233,7 @@ def looking(scheduler: Scheduler) -> float:
     """us of `ray.wait` per result that is not there yet."""
     import ray  # only after `simulated` has set its environment
 
-    actor, _ = next(iter(scheduler.backend._actors.values()))
+    actor, _ = next(iter(backend_of(scheduler)._actors.values()))
     recipe = ray.put(Recipe({}, ()))
     refs = [actor.do.remote(recipe, Nothing(seconds=0.02)) for _ in range(1000)]
     began, count = time.perf_counter(), 50
@@ -252,13 +259,15 @@ def storing(creature: Creature, state: Any) -> float:
 class Timed:
     """See `Evaluator`: another one, with the time that it took."""
 
-    def __init__(self, evaluator: Any) -> None:
+    def __init__(self, evaluator: Evaluator) -> None:
         self._evaluator, self.seconds = evaluator, 0.0
 
-    def judge(self, genomes: Any, trials: Any, settings: Any) -> Any:
+    def judge(
+        self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
+    ) -> Judged:
         jax.block_until_ready(genomes)
         began = time.perf_counter()
-        found = self._evaluator.judge(genomes, trials, settings)
+        found = self._evaluator.judge(genomes, trials, settings, asked)
         self.seconds += time.perf_counter() - began
         return found
 
@@ -318,9 +327,14 @@ def in_turns(clock: Clock, work: Callable[[], None], laps: int) -> dict[str, Any
     }
 
 
+def backend_of(scheduler: Scheduler) -> "RayBackend":
+    """The scheduler's backend, which is Ray's."""
+    return cast("RayBackend", scheduler.backend)
+
+
 def work_of(scheduler: Scheduler) -> float:
     """Seconds of work of all workers."""
-    return float(sum(scheduler.backend.seconds.values()))
+    return float(sum(backend_of(scheduler).seconds.values()))
 
 
 def gather(scheduler: Scheduler, count: int) -> None:

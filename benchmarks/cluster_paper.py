@@ -13,15 +13,17 @@ import dataclasses
 import heapq
 import json
 import time
+from collections.abc import Hashable
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, cast
 
 from cluster import Nothing, gather, say
 from simulated import machines
 
 from mjxgait.cli.ablate import ROWS, STRIDE
 from mjxgait.distributed.connect import connected
+from mjxgait.distributed.jobs import Job
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Report, Scheduler, Worker
 
@@ -103,14 +105,17 @@ def on_paper(
     """
     hands = Paper(workers, costs)
     scheduler = Scheduler(hands, clock=lambda: hands.now)
-    left = dict.fromkeys(range(count), in_a_row)
+    left: dict[Hashable, int] = dict.fromkeys(range(count), in_a_row)
+    recipe, job = Recipe({}, ()), cast(Job, piece)  # `Paper` does nothing with either
     for key in left:
-        scheduler.submit(key, lambda: (None, piece))
+        scheduler.submit(key, lambda: (recipe, job))
     while left:
-        key, _ = scheduler.next(bool)
+        ended = scheduler.next(bool)
+        assert ended is not None  # nothing stops it
+        key = ended[0]
         left[key] -= 1
         if left[key]:
-            scheduler.submit(key, lambda: (None, piece), first=True)
+            scheduler.submit(key, lambda: (recipe, job), first=True)
         else:
             del left[key]
     return hands.now, count * in_a_row * piece.seconds / (workers * hands.now)

@@ -31,7 +31,7 @@ from mjxgait.physics import make_plant
 from mjxgait.training.stages import prepare_devices
 from mjxgait.types import BodyState, Plant, Sensed
 
-WIDE = {"xla_cpu_prefer_vector_width": "512"}
+WIDE: dict[str, str | bool] = {"xla_cpu_prefer_vector_width": "512"}
 """As in `mjxgait train`."""
 GROUNDS = ("flat", "slope:0.1", "steps:0.05", "bumps:0.05", "rough:0.05")
 

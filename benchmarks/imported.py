@@ -52,7 +52,8 @@ def main() -> None:
     options = parser.parse_args()
     print(*HEADER, sep=" | ")
     for name in [] if options.files else options.models:
-        print(*walk(name, *model_file(name), options.out, options.more), sep=" | ", flush=True)
+        path, search = model_file(name)
+        print(*walk(name, path, search, options.out, options.more), sep=" | ", flush=True)
     for file in options.files or ():
         print(*walk(file.name, file, (), options.out, options.more), sep=" | ", flush=True)
 

@@ -10,8 +10,8 @@ import argparse
 import json
 from pathlib import Path
 
-import bpy  # type: ignore[import-not-found]
-from mathutils import Quaternion, Vector  # type: ignore[import-not-found]
+import bpy
+from mathutils import Quaternion, Vector
 
 SIZE, SAMPLES = (560, 400), 64
 THICK = 0.06

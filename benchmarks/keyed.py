@@ -58,7 +58,7 @@ def drawn(creature: Creature, name: str) -> dict[str, np.ndarray]:
     """Return angles [F] in degrees by joint, the last frame equal to the first."""
     kind, gait, seconds, carries, hip, knee = CHARTS[name]
     time = np.linspace(0.0, 1.0, round(seconds * RATE) + 1)
-    angles = {}
+    angles: dict[str, np.ndarray] = {}
     if kind == "crab":
         places = [
             f"{row}_{side}" for row in ("front", "middle", "hind") for side in ("left", "right")

@@ -40,7 +40,7 @@ class Depths:
         )
         self.usual = np.array([max(self._depth(a, b), 0.0) for a, b in self.pairs])
 
-    def of(self, qpos: np.ndarray) -> tuple[float, tuple[str, str]]:
+    def of(self, qpos: np.ndarray) -> tuple[float, tuple[str, ...]]:
         """Return the greatest depth in a pose [nq], m, and its parts; 0 if standing is as deep."""
         self._place(qpos)
         bound = self.model.geom_rbound[self.pairs].sum(1)

@@ -12,8 +12,8 @@ import importlib
 import math
 from pathlib import Path
 
-import bpy  # type: ignore[import-not-found]
-from mathutils import Vector  # type: ignore[import-not-found]
+import bpy
+from mathutils import Vector
 
 SIDES, RINGS = 8, (0.1, 0.5, 0.9)
 THICK = 0.12
@@ -51,7 +51,9 @@ def drawn(kind: str) -> bpy.types.Object:
 
 def wrapped(rig: bpy.types.Object) -> None:
     """Add a mesh of tubes that follows the bones."""
-    corners, faces, groups = [], [], {}
+    corners: list[tuple[float, ...]] = []
+    faces: list[tuple[int, ...]] = []
+    groups: dict[str, range] = {}
     for bone in rig.data.bones:
         first = len(corners)
         corners += tube(bone.head_local, bone.tail_local)
