@@ -151,7 +151,7 @@ def saving(folder: Path, generation: int) -> Callable[[], bool]:
     return lambda: any((folder / "checkpoints").glob(f"{generation}.*tmp*"))
 
 
-MOMENTS = ("save 1", "generation 3", "save 5")
+MOMENTS = ("generation 2", "save 4")
 
 
 def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
@@ -165,13 +165,13 @@ def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
         ready = (generations if kind == "generation" else saving)(folder, int(number))
         codes.append(kill_when(ready, *begin))
         begin = ("train", "--resume", folder, "--no-plots")
-    assert codes.count(-signal.SIGKILL) >= 2, "at most one moment may have passed unseen"
+    assert -signal.SIGKILL in codes, "at most one moment may have passed unseen"
     said_by(capsys, *begin, code=0)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
 
 
-@pytest.mark.thorough("a run that is killed three times is compared too")
+@pytest.mark.thorough("a run that is killed twice is compared too")
 def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
     finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
 ):

@@ -7,7 +7,7 @@ compiles nothing anew, except a weight marked `SHAPE`: its zero removes a term.
 
 import dataclasses
 import functools
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, cast, get_args, get_origin, get_type_hints
 
 import jax
 import jax.numpy as jnp
@@ -45,7 +45,13 @@ def chosen(value: Any, option: str) -> jax.Array:
 
 def traced(config: Config) -> Config:
     """Return the config with arrays for numbers and `Choice` for choices, without host settings."""
-    return _traced(config)
+    # Arrays of JAX, for code under trace may index them.
+    return cast(Config, jax.tree.map(jnp.asarray, _traced(config)))
+
+
+def traced_structure(config: Config) -> jax.tree_util.PyTreeDef:
+    """Return the structure of `traced(config)`, which makes no arrays on the device."""
+    return jax.tree.structure(_traced(config))
 
 
 def _traced(config: Any) -> Any:

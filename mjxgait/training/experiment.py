@@ -13,7 +13,7 @@ import numpy as np
 
 from mjxgait.champion import Champion
 from mjxgait.config.schema import Config
-from mjxgait.config.traced import traced
+from mjxgait.config.traced import traced, traced_structure
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
@@ -59,7 +59,7 @@ class Shape:
 def shape_of(creature: Creature, config: Config) -> Shape:
     """Return the program key of a creature's run under a config."""
     code = (find("controller", config.use.controller), find("task", config.use.task))
-    return Shape(creature.digest, jax.tree.structure(traced(config)), code)
+    return Shape(creature.digest, traced_structure(config), code)
 
 
 T = TypeVar("T")
@@ -313,7 +313,7 @@ def build_batch(
       UserError: two configs need different programs, or the physics does not support the creature's
         model.
     """
-    if len({jax.tree.structure(traced(config)) for config in configs}) != 1:
+    if len({traced_structure(config) for config in configs}) != 1:
         raise UserError(
             "these settings need programs of different shapes: run them in batches of their own"
         )

@@ -27,7 +27,7 @@ generations = 3
 
 [base]
 evolution = {{ population = 6 }}
-rollout = {{ seconds = 0.4, starts = 2, physics = "mjx", lanes = 4 }}
+rollout = {{ seconds = 0.4, starts = 2, lanes = 4 }}
 
 [[variant]]
 name = "stable PD"
@@ -38,7 +38,7 @@ settings = {{ drive = {{ law = "pd" }} }}
 
 [[variant]]
 name = "three key poses"
-settings = {{ controller = {{ key_poses = 3 }}, rollout = {{ physics = "auto" }} }}
+settings = {{ controller = {{ key_poses = 3 }} }}
 generations = 2
 """
 
@@ -65,7 +65,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def finished(study: Path, emitted_as_shipped: None) -> tuple[Path, str]:
+def finished(study: Path) -> tuple[Path, str]:
     """Folder and report of a study that was killed amid its runs, and then while it measured.
 
     The second time as a system kills that is out of memory: then it says so, and goes on too.
@@ -129,7 +129,7 @@ def test_the_report_holds_everything(finished: tuple[Path, str]):
 @pytest.mark.thorough("test_hyper compares a row with a run alone, to the bit")
 def test_a_row_is_the_run_that_train_makes(finished: tuple[Path, str], tmp_path: Path):
     """Same seed, same settings: the same log. Here up to rounding, which differs between the two
-    programs of the fast step; `test_hyper` compares a row with the run alone to the bit, on MJX.
+    programs; `test_hyper` compares a row with the run alone to the bit, on MJX.
     """
     folder, _ = finished
     train = "--seed 1 --population 6 --generations 3 --drive.law pd"

@@ -13,7 +13,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
-import jax
 import numpy as np
 
 from mjxgait.certification import certify
@@ -21,7 +20,7 @@ from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion, read_champion, write_champion
-from mjxgait.config.traced import traced
+from mjxgait.config.traced import traced_structure
 from mjxgait.creature import Creature, load_creature
 from mjxgait.distributed.jobs import Advanced, AdvanceRows, Job
 from mjxgait.distributed.recipe import Recipe
@@ -52,7 +51,7 @@ def groups(plan: Plan) -> list[list[Run]]:
     """Return the runs that share a program, side by side, in the plan's order."""
     found: dict[Any, list[Run]] = {}
     for run in plan.runs:
-        found.setdefault(jax.tree.structure(traced(run.config)), []).append(run)
+        found.setdefault(traced_structure(run.config), []).append(run)
     most = plan.study.rows or len(plan.runs)
     return [
         runs[first : first + most] for runs in found.values() for first in range(0, len(runs), most)
