@@ -130,6 +130,7 @@ def test_a_stance_that_was_searched_has_no_foot_within_the_hips(tmp_path: Path, 
 DOGS = ("unitree a1", "unitree go2", "laikago", "mini cheetah", "solo12", "anymal b")
 
 
+@pytest.mark.thorough("each of them is imported, and test_inputs.py compares topologies")
 def test_robot_dogs_share_one_program():
     """Twelve joints each, whatever rotors, sensors and shapes their files have."""
 

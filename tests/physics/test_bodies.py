@@ -50,7 +50,10 @@ def moment(models: list[mujoco.MjModel]) -> Moment:
     return moments(models)
 
 
-@pytest.fixture(scope="module", params=PLANTS)
+MJX = pytest.mark.thorough("test_weights.py and test_body_parts.py have bodies per lane on MJX")
+
+
+@pytest.fixture(scope="module", params=["fast", pytest.param("mjx", marks=MJX)])
 def plant(request: pytest.FixtureRequest) -> Plant:
     """Made of a body that none of the lanes has."""
     model = mujoco.MjModel.from_xml_string(XML)

@@ -61,7 +61,7 @@ def first_programs(count: int, words: Words = WORDS, seed: int = 0) -> tuple[jax
 
 
 @pytest.fixture(scope="module")
-def programs() -> tuple[np.ndarray, np.ndarray]:
+def programs(as_shipped: None) -> tuple[np.ndarray, np.ndarray]:
     """[MANY, NODES] that were crossed and mutated after they were made."""
     tree = first_programs(MANY)
     keys = jax.random.split(key_of(1), (2, MANY))
@@ -87,13 +87,16 @@ def mutants(keys: jax.Array, tree: Any, shares: jax.Array) -> tuple[np.ndarray, 
     return np.asarray(code), np.asarray(value)
 
 
+TAKEN = np.asarray(ARITY).tolist()
+
+
 def taken(code: int) -> int:
-    return int(ARITY[code]) if code < FIRST_ADDED else 0
+    return TAKEN[code] if code < FIRST_ADDED else 0
 
 
 def plain_end(code: np.ndarray, start: int) -> int:
     """Where the subtree that begins at a place ends, read node by node."""
-    wanted, i = 1, start
+    wanted, i, code = 1, start, code.tolist()
     while wanted:
         wanted += taken(code[i]) - 1
         i += 1
@@ -102,7 +105,7 @@ def plain_end(code: np.ndarray, start: int) -> int:
 
 def plain_depth(code: np.ndarray) -> int:
     """Of a whole tree, by recursion."""
-    nodes = iter(code)
+    nodes = iter(code.tolist())
 
     def below() -> int:
         node = next(nodes)
@@ -266,7 +269,7 @@ def test_the_evaluator_does_not_care_for_its_neighbours(programs: Any):
     np.testing.assert_allclose(np.stack(alone), together, rtol=1e-6, atol=1e-6)
 
 
-def test_the_first_programs_are_shaped_as_deaps():
+def test_the_first_programs_are_shaped_as_deaps(as_shipped: None):
     """Ramped half-and-half of depths 2 to 5: mean size and depth within 4 %, and their spread."""
     known = deaps()
     known.addEphemeralConstant("ball", partial(np.random.default_rng(0).uniform, -1, 1))
