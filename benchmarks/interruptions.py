@@ -188,7 +188,9 @@ def interrupted(
         if last.code == 2:  # nothing was there to go on with
             last = machine.run(command.begin(out))
     if first.broken or last.broken:
-        return f"broken: {(first if first.broken else last).said[-1500:]}"
+        worse = first if first.broken else last
+        begin = max(worse.said.find("Traceback"), 0)
+        return f"broken: exit code {worse.code}: {worse.said[begin:][:3000]}"
     if last.code not in (0, 1):
         return f"stuck: {last.said[-1500:]}"
     if left := [path.name for path in out.rglob("*") if HALF_WRITTEN.search(path.name)]:

@@ -151,10 +151,27 @@ def _start(pool: concurrent.futures.Executor, count: int) -> None:
     handle (OSError), or its number taken by another file (ValueError).
     """
     try:
-        for _ in range(count):
-            pool.submit(int)
+        with _interrupts_held():
+            for _ in range(count):
+                pool.submit(int)
     except (OSError, ValueError) as error:
         raise BrokenProcessPool("a process was killed as the others were started") from error
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C back in this thread, and for good in processes that it starts.
+
+    A process that is importing modules would print a traceback before `_begin` can prevent it.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # as on Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin(prepare: Callable[[], object] | None) -> None:

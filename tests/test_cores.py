@@ -1,7 +1,10 @@
 """Processes that use a core each: who loses one says so, and does not wait for it."""
 
+import signal
 import subprocess
 import sys
+
+from mjxgait.processes import process_per_core
 
 LOSES_ONE = """
 import multiprocessing, threading, time
@@ -30,3 +33,11 @@ def test_a_process_that_is_killed_as_it_starts_is_not_waited_for():
         [sys.executable, "-c", LOSES_ONE], capture_output=True, text=True, timeout=60, check=False
     )
     assert done.stdout.split() == ["lost"] * 8, done.stderr
+
+
+def test_ctrl_c_does_not_reach_a_process_that_is_importing():
+    """Its signal is held back from the start, and this process gets it again."""
+    with process_per_core(1) as pool:
+        held = pool.submit(signal.pthread_sigmask, signal.SIG_BLOCK, ()).result()
+    assert signal.SIGINT in held
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
