@@ -96,7 +96,8 @@ def run_study(
                 scheduler.submit(number, group.work, first=True)
             else:
                 left.pop(number).close()
-    return not left
+        # Ctrl-C in the last generation: what would come next takes minutes too.
+        return not left and not interrupted.is_set()
 
 
 class _Group:
