@@ -10,11 +10,11 @@ import functools
 import importlib
 import pkgutil
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from mjxgait.errors import UserError, did_you_mean, not_loaded
 
-Part = Any
+Part = object
 """An object, or its location: `module:name` within the slice's folder."""
 
 
@@ -143,7 +143,7 @@ def meant_of_grown(task: str) -> str:
     return called.get(task, task)
 
 
-def _refuse(sort: str, name: str) -> Any:
+def _refuse(sort: str, name: str) -> NoReturn:
     if ":" in name:
         raise not_loaded(sort, name)
     raise UserError(f'there is no {sort} "{name}"; {did_you_mean(name, shipped(sort))}')

@@ -12,6 +12,8 @@ import jax
 import numpy as np
 
 T = TypeVar("T")
+Tree = TypeVar("Tree")
+"""A pytree of a kind that only its maker knows."""
 Number = jax.Array | np.ndarray
 """A NumPy array is a constant of the program."""
 
@@ -113,7 +115,11 @@ class Asked:
     known: Judged
 
 
-class Plant(Protocol):
+Workings = TypeVar("Workings")
+Parameters = TypeVar("Parameters")
+
+
+class Plant(Protocol[Workings]):
     """Batched physics, one step split around the controller.
 
     Every array has one more axis than documented on the state: the lanes, at position `lane_axis`
@@ -130,18 +136,18 @@ class Plant(Protocol):
         """Note to the user about the choice of this plant; empty if there is none."""
         ...
 
-    def forward(self, state: BodyState) -> tuple[Sensed, Any]:
+    def forward(self, state: BodyState) -> tuple[Sensed, Workings]:
         """Compute the current state's position and velocity dependent terms.
 
         Also return the plant's step data (`workings`) for the two calls below.
         """
         ...
 
-    def solve_damped(self, workings: Any, damping: jax.Array, force: jax.Array) -> jax.Array:
+    def solve_damped(self, workings: Workings, damping: jax.Array, force: jax.Array) -> jax.Array:
         """Return accelerations `(M + diag(damping))^-1 force`; both arguments `[nv]` per lane."""
         ...
 
-    def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
+    def advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
         """Return the state one `sim_dt` later under applied generalised forces `torque` `[nv]`.
 
         Friction passes through.
@@ -156,11 +162,11 @@ class Plant(Protocol):
         ...
 
 
-class ModelPlant(Plant, Protocol):
+class ModelPlant(Plant[Workings], Protocol[Workings, Parameters]):
     """Physics of one creature's model with replaceable parameters."""
 
     @property
-    def parameters(self) -> Any:
+    def parameters(self) -> Parameters:
         """Parameters of the body that all lanes have: the plant's own pytree, without lanes.
 
         They are constants of the program, or its inputs (`with_parameters`). A `BodyState` with
@@ -168,7 +174,7 @@ class ModelPlant(Plant, Protocol):
         """
         ...
 
-    def parameters_of(self, model: Any, layout: Any, crossings: Any = None) -> Any:
+    def parameters_of(self, model: Any, layout: Any, crossings: Any = None) -> Parameters:
         """Return the parameters of another body of the same topology.
 
         model, layout, crossings: the other body's, as in the construction of this plant.
@@ -178,18 +184,18 @@ class ModelPlant(Plant, Protocol):
         """
         ...
 
-    def with_parameters(self, parameters: Any) -> Self:
+    def with_parameters(self, parameters: Parameters) -> Self:
         """Return the plant of another body: constants as from `parameters_of`, or traced arrays."""
         ...
 
-    def heavier(self, parameters: Any, factor: Number) -> Any:
+    def heavier(self, parameters: Parameters, factor: Number) -> Parameters:
         """Return one body's parameters with masses and inertias times factor, [] or [nbody - 1].
 
         Dependent numbers (the weights of constraints) are computed anew.
         """
         ...
 
-    def resized(self, parameters: Any, factor: Number) -> Any:
+    def resized(self, parameters: Parameters, factor: Number) -> Parameters:
         """Return one body's parameters with each part's lengths times factor [nbody - 1].
 
         Its mass is scaled by the third power and its inertia by the fifth (`creature.scale`).

@@ -6,7 +6,7 @@ import json
 import reprlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
 import numpy as np
 import pydantic
@@ -27,6 +27,9 @@ from mjxgait.creature.proportions import grown, proportions
 from mjxgait.errors import UserError
 from mjxgait.files import DamagedFile, read_json, write_text
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 SCHEMA = 2
 """File version. Version 1 implied key poses and kept the drive in the controller settings."""
 
@@ -34,6 +37,14 @@ SOUGHT = ("around", "within", "expressions")
 """Settings of where the search starts; they do not affect how a champion moves."""
 USUAL = {"steering": 1.0}
 """Settings added later, with the value implied before: older champions keep their fingerprint."""
+
+
+class Scored(TypedDict):
+    """Results of an individual: fitness, terms and origin of `Champion`."""
+
+    fitness: float
+    terms: Mapping[str, float]
+    origin: Mapping[str, object]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,7 +73,9 @@ class Champion:
     pose_span: float = 0.0
 
     @classmethod
-    def of(cls, creature: Creature, config: Config, genome: Genome, **scored: Any) -> "Champion":
+    def of(
+        cls, creature: Creature, config: Config, genome: Genome, **scored: Unpack[Scored]
+    ) -> "Champion":
         """Return the individual with this genome in a run; scored: fitness, terms and origin."""
         genome, sizes = split_genome(genome)
         return cls(
@@ -101,7 +114,7 @@ class Champion:
 
         Body, controller, genome and settings; not the fitness or the origin.
         """
-        moves: dict[str, Any] = {
+        moves: dict[str, object] = {
             "creature": self.digest,
             "controller": self.controller,
             # As float64, which a file gives back: writing a champion keeps its fingerprint.
@@ -139,7 +152,7 @@ def split_genome(genome: Genome) -> tuple[dict[str, np.ndarray], np.ndarray | No
     return (own, genome["sizes"]) if own else (dict(genome), None)
 
 
-def as_table(settings: Any) -> dict[str, Any]:
+def as_table(settings: "Mapping[str, object] | DataclassInstance") -> dict[str, object]:
     """Return settings as a table; they are one already, or a dataclass."""
     return dict(settings) if isinstance(settings, Mapping) else dataclasses.asdict(settings)
 

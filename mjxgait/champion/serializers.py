@@ -6,7 +6,7 @@ The controller defines their shapes and names.
 
 import functools
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from typing_extensions import override
@@ -16,16 +16,17 @@ from mjxgait.errors import UserError
 from mjxgait.kinds import ControllerKind, known_controller
 
 Genome = Mapping[str, np.ndarray]
+Settings = TypeVar("Settings")
 
 
-class Serializer(Protocol):
+class Serializer(Protocol[Settings]):
     """Serializer between the arrays of a kind of genome and their form in `champion.json`."""
 
     def settled(self, genome: Genome, creature: Creature) -> dict[str, np.ndarray]:
         """Return the arrays of a champion as its file will give them back."""
         ...
 
-    def document(self, genome: Genome, settings: Any, creature: Creature) -> dict[str, Any]:
+    def document(self, genome: Genome, settings: Settings, creature: Creature) -> dict[str, Any]:
         """Return the readable form of a genome."""
         ...
 
@@ -37,7 +38,7 @@ class Serializer(Protocol):
         """
         ...
 
-    def settings(self, table: Mapping[str, Any], where: str) -> Any:
+    def settings(self, table: Mapping[str, object], where: str) -> Settings:
         """Return the controller's settings from a table of the file `where`."""
         ...
 
@@ -49,16 +50,18 @@ class Serializer(Protocol):
         """
         ...
 
-    def shapes(self, settings: Any, creature: Creature) -> dict[str, tuple[int, ...]]:
+    def shapes(self, settings: Settings, creature: Creature) -> dict[str, tuple[int, ...]]:
         """Return the array shapes that the settings determine."""
         ...
 
-    def embodied(self, genome: Genome, settings: Any, task: str, creature: Creature) -> Creature:
+    def embodied(
+        self, genome: Genome, settings: Settings, task: str, creature: Creature
+    ) -> Creature:
         """Return the body that the genome grows into; the creature itself where none grows."""
         ...
 
 
-class PlainSerializer(Serializer):
+class PlainSerializer(Serializer[Settings]):
     """See `Serializer`: arrays as nested lists under their names. Other serializers inherit from it."""
 
     @override
@@ -66,14 +69,14 @@ class PlainSerializer(Serializer):
         return dict(genome)
 
     @override
-    def document(self, genome: Genome, settings: Any, creature: Creature) -> dict[str, Any]:
+    def document(self, genome: Genome, settings: Settings, creature: Creature) -> dict[str, object]:
         return {name: np.asarray(array, float).tolist() for name, array in genome.items()}
 
     @override
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
         return {name: np.array(values, float) for name, values in document.items()}
 
-    def settings(self, table: Mapping[str, Any], where: str) -> Any:
+    def settings(self, table: Mapping[str, object], where: str) -> Any:
         """See `Serializer`: the table unparsed; it is parsed where the controller is available."""
         return dict(table)
 
@@ -87,11 +90,13 @@ class PlainSerializer(Serializer):
                 )
 
     @override
-    def shapes(self, settings: Any, creature: Creature) -> dict[str, tuple[int, ...]]:
+    def shapes(self, settings: Settings, creature: Creature) -> dict[str, tuple[int, ...]]:
         return {}
 
     @override
-    def embodied(self, genome: Genome, settings: Any, task: str, creature: Creature) -> Creature:
+    def embodied(
+        self, genome: Genome, settings: Settings, task: str, creature: Creature
+    ) -> Creature:
         return creature
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from mjxgait.config.schema import Config, UseConfig
-from mjxgait.config.tables import build, merge, read_toml
+from mjxgait.config.tables import Table, build, merge, read_toml
 from mjxgait.errors import UserError, did_you_mean
 
 
@@ -63,13 +63,13 @@ def find_creature(name: str) -> Path:
     )
 
 
-Layer = tuple[str, Mapping[str, Any]]
+Layer = tuple[str, Table]
 """Name of a source of settings in errors, and its table."""
 Meant = Callable[[UseConfig], UseConfig]
 
 
 def resolve_config(
-    creature_table: Mapping[str, Any],
+    creature_table: Table,
     creature_name: str,
     file: Path | None = None,
     use: Mapping[str, str] | None = None,
@@ -106,7 +106,7 @@ def resolve_config(
         tables = _layers_of(of_tasks, chosen, meant, f"{creature_name}/creature.toml: [train.task")
         given += [(w, {**table, "use": dataclasses.asdict(chosen)}) for w, table in tables]
     cls = config_class(chosen)
-    table: dict[str, Any] = {}
+    table: Table = {}
     for where, layer in [
         *((w, _without_absent(given_one, chosen, meant)) for w, given_one in given),
         *mine.general,
@@ -121,7 +121,7 @@ def resolve_config(
     return config
 
 
-def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
+def over_base(table: Table, where: str) -> dict[str, Any]:
     """Merge a table of settings over the shipped config named by its key `base`, if it has one.
 
     Raises:
@@ -138,7 +138,7 @@ def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     return merge(over_base(read_toml(under), str(under)), rest)
 
 
-def _layers_of(tables: Mapping[str, Any], use: UseConfig, meant: Meant, where: str) -> list[Layer]:
+def _layers_of(tables: Table, use: UseConfig, meant: Meant, where: str) -> list[Layer]:
     """Return the layers of the task in `use`, from each table whose name means this task."""
     names = [n for n in tables if meant(dataclasses.replace(use, task=n)).task == use.task]
     return [layer for name in names for layer in _tables_of(tables, name, where)]
@@ -171,7 +171,7 @@ def _check_other_tasks(
             build(cls, merge(base, table), place)
 
 
-def _tables_of(tables: Mapping[str, Any], task: str, where: str) -> list[Layer]:
+def _tables_of(tables: Table, task: str, where: str) -> list[Layer]:
     """Return the layers of a task: its table, over the table of the task named by `like`.
 
     where: beginning of each table's name, such as `mine.toml: [task`.
@@ -194,8 +194,8 @@ def _tables_of(tables: Mapping[str, Any], task: str, where: str) -> list[Layer]:
     return [*_tables_of(others, like, where), (place, own)]
 
 
-def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, str]) -> UseConfig:
-    table: dict[str, Any] = {}
+def _chosen(layers: Sequence[Layer], use: Mapping[str, str]) -> UseConfig:
+    table: Table = {}
     for where, layer in layers:
         given = layer.get("use", {})
         if not isinstance(given, Mapping):
@@ -205,7 +205,7 @@ def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, s
     return build(UseConfig, merge(table, use), "the options")
 
 
-def _without_absent(layer: Mapping[str, Any], use: UseConfig, meant: Meant) -> dict[str, Any]:
+def _without_absent(layer: Table, use: UseConfig, meant: Meant) -> dict[str, Any]:
     """Drop a layer's keys for an unused controller or task.
 
     The layer was written for the controller and task that it names, or else for the default ones.
@@ -229,7 +229,7 @@ class _FileLayers:
     standalone: bool = False
     general: tuple[Layer, ...] = ()
     creature: tuple[Layer, ...] = ()
-    tasks: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    tasks: Table = dataclasses.field(default_factory=dict)
     where: str = ""
 
 

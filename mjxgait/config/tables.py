@@ -9,13 +9,17 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import pydantic
 import tomli_w
 
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.files import DamagedFile, check_tree, read_text
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+    from pydantic_core import ErrorDetails
 
 T = TypeVar("T")
 Table = Mapping[str, Any]
@@ -79,7 +83,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     return table
 
 
-def dump_toml(value: Any) -> str:
+def dump_toml(value: "DataclassInstance") -> str:
     """Return the TOML text of a dataclass; keys that are None are left out."""
     return tomli_w.dumps(_without_none(dataclasses.asdict(value)))
 
@@ -114,7 +118,7 @@ def build(cls: type[T], table: Table, where: str) -> T:
         raise UserError(f"{where}: {_sentence(cls, problems[0])}") from None
 
 
-def check(cls: type, document: Any, where: str, cure: str) -> None:
+def check(cls: type, document: object, where: str, cure: str) -> None:
     """Refuse a document written by a program that violates the schema `cls`.
 
     Args:
@@ -131,7 +135,7 @@ def check(cls: type, document: Any, where: str, cure: str) -> None:
         raise DamagedFile(f"{error}; {cure}") from None
 
 
-def check_whole(value: Any, table: Table, where: str) -> None:
+def check_whole(value: "DataclassInstance", table: Table, where: str) -> None:
     """Refuse a table that lacks keys which `dump_toml` writes for the dataclass read from it.
 
     Raises:
@@ -162,7 +166,7 @@ def _adapter(cls: type) -> pydantic.TypeAdapter:
     return pydantic.TypeAdapter(cls)
 
 
-def _sentence(cls: type, problem: Mapping[str, Any]) -> str:
+def _sentence(cls: type, problem: "ErrorDetails") -> str:
     *parents, last = (str(part) for part in problem["loc"]) if problem["loc"] else [""]
     key = ".".join([*parents, last])
     match problem["type"]:
@@ -193,7 +197,7 @@ def _keys(cls: type, parents: list[str]) -> list[str]:
     return [field.name for field in dataclasses.fields(cls)]
 
 
-def _without_none(value: Any) -> Any:
+def _without_none(value: object) -> Any:
     match value:
         case Mapping():
             return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
@@ -203,9 +207,9 @@ def _without_none(value: Any) -> Any:
             return value
 
 
-def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def flat(table: Mapping[str, object], prefix: str = "") -> dict[str, object]:
     """Return the leaves of nested tables by dotted key; tuples as lists, as in TOML and JSON."""
-    leaves: dict[str, Any] = {}
+    leaves: dict[str, object] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
             leaves |= flat(value, f"{prefix}{key}.")

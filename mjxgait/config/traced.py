@@ -36,7 +36,7 @@ class HostOnly:
         raise TypeError(f'"{self.name}" is read by the host only: the program has no such setting')
 
 
-def chosen(value: Any, option: str) -> jax.Array:
+def chosen(value: str | Choice, option: str) -> jax.Array:
     """Tell whether [] a choice of the config, plain or traced, is this option."""
     if isinstance(value, Choice):
         return value.index == value.options.index(option)
@@ -74,7 +74,7 @@ def _traced(config: Any) -> Any:
     return type(config)(**values)
 
 
-def _leaf(value: Any, hint: Any) -> Any:
+def _leaf(value: Any, hint: Any) -> object:
     if isinstance(value, tuple):
         return tuple(np.float32(end) for end in value)
     if isinstance(value, str):
@@ -85,7 +85,7 @@ def _leaf(value: Any, hint: Any) -> Any:
 
 
 @functools.cache
-def _fields(cls: type) -> list[tuple[Any, Any, str]]:
+def _fields(cls: type) -> list[tuple[dataclasses.Field[object], object, str]]:
     """Return each field of a config class with its type and role.
 
     The role is `SHAPE`, `KIND`, `HOST`, or empty for an input of the program.
@@ -113,7 +113,7 @@ def register(cls: type) -> None:
     _REGISTERED.add(cls)
     roles = {field.name: role for field, _, role in _fields(cls)}
     for field in dataclasses.fields(cls):
-        inner: Any = get_type_hints(cls)[field.name]
+        inner: object = get_type_hints(cls)[field.name]
         if isinstance(inner, type) and dataclasses.is_dataclass(inner):
             register(inner)
     data = [name for name, role in roles.items() if not role]

@@ -3,11 +3,12 @@
 import abc
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.tables import NoSettings
@@ -30,7 +31,13 @@ Command = Literal["pose", "torque"]
 """Type of command: target joint angles [J] in rad for the drive, or torques [J] in N·m."""
 
 
-class Controller(Protocol):
+Settings_contra = TypeVar("Settings_contra", contravariant=True)
+Genome = TypeVar("Genome")
+Plan = TypeVar("Plan")
+Memory = TypeVar("Memory")
+
+
+class Controller(Protocol[Settings_contra, Genome, Plan, Memory]):
     """Controller of one creature: from a genome and observations to a command per control step.
 
     Every method is for one creature; the rollout maps it over its lanes. `prepare` and `init`
@@ -52,40 +59,42 @@ class Controller(Protocol):
         """Control steps per command, one of `key_poses.config.HOLDS`; in between it is held."""
         ...
 
-    def variation(self, settings: Any, evolution: EvolutionConfig) -> Variation:
+    def variation(self, settings: Settings_contra, evolution: EvolutionConfig) -> Variation[Genome]:
         """Return the genetic operators of its genomes, under settings plain or traced."""
         ...
 
-    def genes(self, genomes: Any, settings: Any) -> np.ndarray:
+    def genes(self, genomes: Genome, settings: Settings_contra) -> np.ndarray:
         """Return genomes [N, ...] as rows [N, genes], in gene ranges, to measure diversity."""
         ...
 
-    def numbers(self, genomes: Any) -> Mapping[str, np.ndarray]:
+    def numbers(self, genomes: Genome) -> Mapping[str, np.ndarray]:
         """Return statistics [N] of genomes [N, ...] by name, to follow over the generations."""
         ...
 
-    def prepare(self, genome: Any, settings: Any) -> Any:
+    def prepare(self, genome: Genome, settings: Settings_contra) -> Plan:
         """Return the plan: an episode's data from genome and settings, plain or traced."""
         ...
 
-    def load(self, plan: Any) -> jax.Array | None:
+    def load(self, plan: Plan) -> jax.Array | None:
         """Return the relative cost [] of a command under a plan; None if all cost the same.
 
         Lanes wait for the slowest one, so plans of similar cost are simulated side by side.
         """
         ...
 
-    def init(self) -> Any:
+    def init(self) -> Memory:
         """Return the memory at the start of an episode."""
         ...
 
-    def act(self, plan: Any, memory: Any, senses: Senses) -> tuple[jax.Array, Any]:
+    def act(self, plan: Plan, memory: Memory, senses: Senses) -> tuple[jax.Array, Memory]:
         """Return the command [J] of this control step, and the memory for the next."""
         ...
 
 
-Bounds = Mapping[str, tuple[Any, Any]]
+Bounds = Mapping[str, tuple[ArrayLike, ArrayLike]]
 """Lowest and highest value of each gene, by the name of the array that holds it."""
+Genes = Mapping[str, jax.Array]
+"""Genome of bounded reals: its arrays by name."""
 
 
 class RealController(abc.ABC):
@@ -115,7 +124,7 @@ class RealController(abc.ABC):
         plan: the genome's arrays, unless `prepare` is overridden.
         """
 
-    def prepare(self, genome: Any, settings: Any) -> Any:
+    def prepare(self, genome: Genes, settings: Any) -> Any:
         """See `Controller`."""
         return genome
 
@@ -127,19 +136,19 @@ class RealController(abc.ABC):
         """See `Controller`."""
         return ()
 
-    def variation(self, settings: Any, evolution: EvolutionConfig) -> Variation:
+    def variation(self, settings: Any, evolution: EvolutionConfig) -> Variation[Genes]:
         """See `Controller`."""
         return real_variation(self._box(settings), evolution)
 
-    def genes(self, genomes: Any, settings: Any) -> np.ndarray:
+    def genes(self, genomes: Genes, settings: Any) -> np.ndarray:
         """See `Controller`."""
         return in_ranges(genomes, self._box(settings))
 
-    def numbers(self, genomes: Any) -> Mapping[str, np.ndarray]:
+    def numbers(self, genomes: Genes) -> Mapping[str, np.ndarray]:
         """See `Controller`: none."""
         return {}
 
-    def _box(self, settings: Any) -> Box:
+    def _box(self, settings: object) -> Box:
         def edge(end: int) -> dict[str, jax.Array]:
             bounds = self.bounds(settings).items()
             return {name: jnp.asarray(pair[end], jnp.float32) for name, pair in bounds}
@@ -187,7 +196,7 @@ class BodiedController:
         end = jnp.full(self.sizes, np.log(self.most), jnp.float32)
         return Box(-end, end)
 
-    def variation(self, settings: Any, evolution: EvolutionConfig) -> Variation:
+    def variation(self, settings: object, evolution: EvolutionConfig) -> Variation[Bodied]:
         """See `Controller`: sizes cross gene by gene and mutate like tuning genes."""
         own, box = self.controller.variation(settings, evolution), self.box
         draw = creation(narrowed(box, evolution.initial_spread), evolution)
@@ -214,7 +223,7 @@ class BodiedController:
             first = Bodied(first, jnp.zeros((count, self.sizes)))
         return Variation(create, cross, mutate, long=own.long, first=first)
 
-    def genes(self, genomes: Bodied, settings: Any) -> np.ndarray:
+    def genes(self, genomes: Bodied, settings: object) -> np.ndarray:
         """See `Controller`."""
         plan = self.controller.genes(genomes.plan, settings)
         return np.concatenate([plan, in_ranges(genomes.sizes, self.box)], axis=1)
@@ -223,18 +232,18 @@ class BodiedController:
         """See `Controller`."""
         return self.controller.numbers(genomes.plan)
 
-    def prepare(self, genome: Bodied, settings: Any) -> Any:
+    def prepare(self, genome: Bodied, settings: object) -> object:
         """See `Controller`."""
         return self.controller.prepare(genome.plan, settings)
 
-    def load(self, plan: Any) -> jax.Array | None:
+    def load(self, plan: object) -> jax.Array | None:
         """See `Controller`."""
         return self.controller.load(plan)
 
-    def init(self) -> Any:
+    def init(self) -> object:
         """See `Controller`."""
         return self.controller.init()
 
-    def act(self, plan: Any, memory: Any, senses: Senses) -> tuple[jax.Array, Any]:
+    def act(self, plan: object, memory: object, senses: Senses) -> tuple[jax.Array, object]:
         """See `Controller`."""
         return self.controller.act(plan, memory, senses)

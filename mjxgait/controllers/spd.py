@@ -7,7 +7,7 @@ solve with `M + h diag(kd)` between them needs the mass matrix; `Drive.torque` j
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +19,9 @@ from mjxgait.controllers.base import Command
 from mjxgait.controllers.key_poses.config import DriveConfig
 from mjxgait.creature.body import Body
 from mjxgait.types import BodyState, Plant, Sensed, pytree
+
+Workings = TypeVar("Workings")
+Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def pd_force(
@@ -76,11 +79,11 @@ class Drive:
 
     def torque(
         self,
-        plant: Plant,
+        plant: Plant[Workings],
         rules: Rules,
         body: BodyState,
         sensed: Sensed,
-        workings: Any,
+        workings: Workings,
         command: jax.Array,
     ) -> jax.Array:
         """Return joint torques in N·m, [J] per lane, as are rules, states and command."""
@@ -122,6 +125,6 @@ class Drive:
         return jnp.zeros(nv, jnp.float32).at[adr].set(joints)
 
 
-def per_lane(plant: Plant, function: Callable[..., Any]) -> Callable[..., Any]:
+def per_lane(plant: Plant, function: Function) -> Function:
     """Map a function of one creature over a plant's lanes."""
     return jax.vmap(function, in_axes=plant.lane_axis, out_axes=plant.lane_axis)

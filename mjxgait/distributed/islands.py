@@ -10,7 +10,6 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import Advanced, AdvanceIsland, Lines
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Scheduler
-from mjxgait.evolution.state import stop_reason
+from mjxgait.evolution.state import EvolutionState, stop_reason
 from mjxgait.training.checkpoint import Checkpoints, Packed
 from mjxgait.training.examination import Examined, Examiner, Exams, why_ended
 from mjxgait.training.experiment import Experiment, build_experiment
@@ -32,6 +31,7 @@ from mjxgait.training.folder import (
     METRICS,
     MIGRATIONS,
     MOTHERS,
+    Line,
     truncate_metrics,
 )
 from mjxgait.training.loop import conclude, interruptible, report, versions
@@ -76,7 +76,7 @@ def gathered(states: Sequence[Packed]) -> Packed:
     return states[leader].with_arrays(_sorted(_joined(found), size))
 
 
-def together(lines: Sequence[Mapping[str, Any]], seconds: float) -> dict[str, Any]:
+def together(lines: Sequence[Line], seconds: float) -> Line:
     """Return one metrics line for all islands; `island` is the index of the best one.
 
     seconds: of all islands for a generation, compilation included. Islands that took turns took
@@ -230,7 +230,7 @@ class _Islands:
         work = ((self.recipe, AdvanceIsland(state, until, i)) for i, state in sent)
         return scheduler.all(work, stopped)
 
-    def keep(self, found: list[Advanced], seconds: float) -> list[dict[str, Any]]:
+    def keep(self, found: list[Advanced], seconds: float) -> Lines:
         """Write all states to disk; return the metrics lines of all islands together.
 
         seconds: that the islands took.
@@ -252,7 +252,7 @@ class _Islands:
         )
         return lines
 
-    def together(self, experiment: Experiment) -> Any:
+    def together(self, experiment: Experiment) -> EvolutionState:
         """Return the best of all islands as one state."""
         known = [state for state in self.states if state is not None]
         return gathered(known).state(experiment.abstract(), str(self.folder))

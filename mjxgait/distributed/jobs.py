@@ -3,7 +3,7 @@
 import dataclasses
 import time
 from collections.abc import Iterator, Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import jax
 import numpy as np
@@ -15,16 +15,18 @@ from mjxgait.evolution.state import EvolutionState, GenerationMetrics, stop_reas
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.checkpoint import Packed, pack
 from mjxgait.training.experiment import Batch, Step
+from mjxgait.training.folder import Line
 from mjxgait.training.loop import followed, metrics_line, versions
 from mjxgait.types import Asked, Judged
 
-Lines = list[dict[str, Any]]
+Lines = list[Line]
+Result_co = TypeVar("Result_co", covariant=True)
 
 
-class Job(Protocol):
+class Job(Protocol[Result_co]):
     """Work on a recipe."""
 
-    def do(self, programs: Programs, recipe: Recipe) -> Any:
+    def do(self, programs: Programs, recipe: Recipe) -> Result_co:
         """Return the result, in NumPy."""
         ...
 
@@ -48,7 +50,7 @@ class Advanced:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class AdvanceRows(Job):
+class AdvanceRows(Job[Advanced]):
     """Advance runs side by side to a generation, from a state or from the beginning.
 
     planted: arrays [B, P, ...] of the initial genomes by name, in place of random ones.
@@ -77,7 +79,7 @@ class AdvanceRows(Job):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class AdvanceIsland(Job):
+class AdvanceIsland(Job[Advanced]):
     """Advance one population of a run to a generation or its end, from a state or anew."""
 
     state: Packed | None
@@ -101,13 +103,13 @@ class AdvanceIsland(Job):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Judge(Job):
+class Judge(Job[Judged]):
     """Evaluate genomes [1, N, ...] on starts [1, R], with leaves in NumPy.
 
     asked: see `Evaluator`.
     """
 
-    genomes: Any
+    genomes: object
     starts: Starts
     asked: Asked | None = None
 

@@ -8,7 +8,7 @@ import dataclasses
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import ray
@@ -53,16 +53,16 @@ class RayBackend(Backend):
         self._tell = tell
         # `look` must run where mjxgait may be missing.
         cloudpickle.register_pickle_by_value(sys.modules[connect.__name__])
-        self._looking: dict[Any, Node] = {}
-        self._coming: dict[Any, Worker] = {}
-        self._working: dict[Any, Worker] = {}
-        self._actors: dict[Worker, tuple[Any, Node]] = {}
+        self._looking: dict[ray.ObjectRef, Node] = {}
+        self._coming: dict[ray.ObjectRef, Worker] = {}
+        self._working: dict[ray.ObjectRef, Worker] = {}
+        self._actors: dict[Worker, tuple[ray.actor.ActorHandle, Node]] = {}
         self._nodes: dict[str, Node] = {}
         self._met: Counter[str] = Counter()
         self._stillborn: Counter[str] = Counter()
         self._tags: dict[str, str] = {}
         self._kinds: dict[str, str] = {}
-        self._recipes: dict[str, Any] = {}
+        self._recipes: dict[str, ray.ObjectRef] = {}
         self._count, self._looked = 0, 0.0
         self.seconds: dict[str, float] = {}
         """Seconds that the workers of each machine have worked."""
@@ -94,7 +94,7 @@ class RayBackend(Backend):
             time.sleep(seconds)
         return [self._report(ref) for ref in _ready(self._working)]
 
-    def _report(self, ref: Any) -> Report:
+    def _report(self, ref: ray.ObjectRef) -> Report:
         worker = self._working.pop(ref)
         try:
             value, seconds = ray.get(ref)
@@ -131,7 +131,7 @@ class RayBackend(Backend):
         ask = ray.remote(connect.look).options(num_cpus=0, max_retries=0, **_on(node))
         self._looking[ask.remote()] = node
 
-    def _meet(self, ref: Any, refuse: bool = False) -> None:
+    def _meet(self, ref: ray.ObjectRef, refuse: bool = False) -> None:
         """Receive a machine's description; ignore it, or refuse it, if versions differ."""
         node = self._looking.pop(ref)
         try:
@@ -168,7 +168,7 @@ class RayBackend(Backend):
         self._actors[worker] = actor, node
         self._coming[actor.ready.remote()] = worker
 
-    def _begun(self, ref: Any) -> Worker | None:
+    def _begun(self, ref: ray.ObjectRef) -> Worker | None:
         """Return the worker once it can work.
 
         A worker that cannot is dropped; one that was killed meanwhile is replaced.
@@ -197,11 +197,11 @@ class RayBackend(Backend):
         self._hire(node)
 
 
-def _on(node: Node) -> dict[str, Any]:
+def _on(node: Node) -> dict[str, object]:
     return {"scheduling_strategy": NodeAffinitySchedulingStrategy(node.id, soft=False)}
 
 
-def _ready(refs: dict[Any, Any]) -> list[Any]:
+def _ready(refs: Mapping[ray.ObjectRef, object]) -> list[ray.ObjectRef]:
     if not refs:
         return []
     done, _ = ray.wait(list(refs), num_returns=len(refs), timeout=0)

@@ -8,7 +8,6 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import jax
 
@@ -17,6 +16,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
 from mjxgait.plugins import build_config
 from mjxgait.plugins.user_code import is_loaded, load, loaded
+from mjxgait.tasks.starts import Starts
 from mjxgait.training.blueprint import Plan, draw_up
 from mjxgait.training.experiment import Batch, Latest, Shape, Step, build_batch, shape_of
 from mjxgait.training.stages import CompiledGeneration, Turn, at_once, compiled
@@ -48,7 +48,7 @@ class Recipe:
     """
 
     files: Mapping[str, str]
-    tables: tuple[Mapping[str, Any], ...]
+    tables: tuple[Mapping[str, object], ...]
     own: tuple[OwnPart, ...] = ()
     sources: tuple[tuple[int, ...], ...] = ()
 
@@ -127,7 +127,7 @@ class Programs:
         return batch.bound(self._stages.find(shape, lambda: batch.stages(turn=turn)))
 
     def judge(
-        self, recipe: Recipe, genomes: Any, starts: Any, asked: Asked | None = None
+        self, recipe: Recipe, genomes: object, starts: Starts, asked: Asked | None = None
     ) -> Judged:
         """Evaluate genomes [1, N, ...], in NumPy."""
         shape, batch = self._known(recipe)

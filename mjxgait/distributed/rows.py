@@ -1,17 +1,16 @@
 """Whole runs as rows of one program, and one large population in chunks."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
 
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
-from mjxgait.distributed.jobs import Advanced, AdvanceRows, Job, Judge
+from mjxgait.distributed.jobs import Advanced, AdvanceRows, Judge, Lines
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
@@ -121,7 +120,7 @@ class Rows:
         stores: Mapping[Path, Checkpoints],
         folder: Path,
         state: Packed,
-        lines: Iterable[Mapping[str, Any]],
+        lines: Lines,
     ) -> None:
         """Write the log first, since a resumed run can remove its lines, and the state last."""
         path = folder / METRICS
@@ -156,15 +155,15 @@ class Blocks:
         self.size = block_size(config.evolution.offspring, config.rollout.block)
 
     def judge(
-        self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
+        self, genomes: object, trials: Starts, settings: Config, asked: Asked | None = None
     ) -> Judged:
         """See `Evaluator`. Takes one row; its settings are in the recipe."""
         genomes, trials, asked = jax.device_get((genomes, trials, asked))
         return together(self._crew.all(self._work(genomes, trials, asked)) or ())
 
     def _work(
-        self, genomes: Any, trials: Starts, asked: Asked | None
-    ) -> Iterator[tuple[Recipe, Job]]:
+        self, genomes: object, trials: Starts, asked: Asked | None
+    ) -> Iterator[tuple[Recipe, Judge]]:
         count = jax.tree.leaves(genomes)[0].shape[1]
         for first in range(0, count, self.size):
 

@@ -9,13 +9,15 @@ from collections import deque
 from collections.abc import Callable, Hashable, Iterable
 from functools import partial
 from statistics import median
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from typing_extensions import override
 
 from mjxgait.distributed.jobs import Job
 from mjxgait.distributed.recipe import Programs, Recipe
 from mjxgait.errors import UserError
+
+Result = TypeVar("Result")
 
 LATE = 2.0
 """Times the median duration after which a job is given to a second worker too, once no other job
@@ -109,7 +111,7 @@ class Scheduler:
         self.backend, self._tell, self._watch, self._clock = backend, tell, watch, clock
         self._waiting: deque[_Task] = deque()
         self._open: dict[Hashable, _Task] = {}
-        self._ready: deque[tuple[Hashable, Any]] = deque()
+        self._ready: deque[tuple[Hashable, object]] = deque()
         self._took: deque[float] = deque(maxlen=MANY)
         self._alone_since: float | None = clock()
         self.idle: list[Worker] = []
@@ -128,8 +130,8 @@ class Scheduler:
         (self._waiting.appendleft if first else self._waiting.append)(task)
 
     def all(
-        self, work: Iterable[tuple[Recipe, Job]], stopped: Callable[[], bool] = _never
-    ) -> list[Any] | None:
+        self, work: Iterable[tuple[Recipe, Job[Result]]], stopped: Callable[[], bool] = _never
+    ) -> list[Result] | None:
         """Return the results of all jobs, in order; None when stopped."""
         keys: list[Hashable] = []
         found: dict[Hashable, Any] = {}

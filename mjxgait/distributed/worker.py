@@ -10,7 +10,13 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from mjxgait.distributed.jobs import Job
+    from mjxgait.distributed.recipe import Recipe
+
+Result = TypeVar("Result")
 
 ENVIRONMENT = {
     "NPROC": "1",  # XLA's threads
@@ -46,7 +52,7 @@ class RemoteWorker:
         try_room(Path(tempfile.gettempdir()), ROOM)
         return os.getpid()
 
-    def do(self, recipe: Any, job: Any) -> tuple[Any, float]:
+    def do(self, recipe: "Recipe", job: "Job[Result]") -> tuple[Result, float]:
         """Return the job's result and its duration in s."""
         began = time.perf_counter()
         result = job.do(self._programs, recipe)

@@ -9,22 +9,26 @@ Letters: `P` population, `M` offspring, `N` all of them; `R`, `F` trials and ter
 """
 
 import dataclasses
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.config.traced import chosen
+from mjxgait.config.traced import Choice, chosen
 from mjxgait.evolution.state import NOBODY, EvolutionState, Proposal
 from mjxgait.evolution.variation import Variation, first_occurrence
+from mjxgait.types import Tree
 
 TRIES = 16
 """Draws of a child that must be new; if all give existing genomes, the first is mutated."""
 
 
 def parents(
-    key: jax.Array, count: int, population: jax.Array | int, selection: Any, rivals: int = 2
+    key: jax.Array,
+    count: int,
+    population: jax.Array | int,
+    selection: str | Choice,
+    rivals: int = 2,
 ) -> tuple[jax.Array, jax.Array]:
     """Draw places [count] of mothers and fathers in a population sorted best first.
 
@@ -73,7 +77,7 @@ class Nursery:
     config: EvolutionConfig
     variation: Variation
 
-    def children(self, key: jax.Array, adults: Any) -> tuple[Any, jax.Array]:
+    def children(self, key: jax.Array, adults: Tree) -> tuple[Tree, jax.Array]:
         """Return children [M, ...] of genomes [P, ...], best first, and which [M] are crossovers.
 
         A child that was mutated because no unique crossover was found does not count as crossover.
@@ -81,7 +85,7 @@ class Nursery:
         count = self.config.offspring
         pool = jax.tree.map(lambda leaf: _with_room(leaf, count), adults)
 
-        def birth(pool: Any, turn: tuple[jax.Array, jax.Array]) -> tuple[Any, jax.Array]:
+        def birth(pool: Tree, turn: tuple[jax.Array, jax.Array]) -> tuple[Tree, jax.Array]:
             place, key = turn
             child, of_two = self._child(key, pool, place)
             return jax.tree.map(lambda leaf, new: leaf.at[place].set(new), pool, child), of_two
@@ -90,7 +94,7 @@ class Nursery:
         pool, of_two = jax.lax.scan(birth, pool, (places, jax.random.split(key, count)))
         return jax.tree.map(lambda leaf: leaf[self.config.population :], pool), of_two
 
-    def _child(self, key: jax.Array, pool: Any, size: jax.Array) -> tuple[Any, jax.Array]:
+    def _child(self, key: jax.Array, pool: Tree, size: jax.Array) -> tuple[Tree, jax.Array]:
         """Return the next child of a pool that fills its first `size` [] places."""
         among = size if self.config.pool == "growing" else self.config.population
         if not self.config.unique_children:
@@ -105,7 +109,7 @@ class Nursery:
         mutant = self.variation.mutate(key_mutate, child)
         return _either(new[first], child, mutant), new[first] & of_two[first]
 
-    def _draw(self, key: jax.Array, pool: Any, among: jax.Array | int) -> tuple[Any, jax.Array]:
+    def _draw(self, key: jax.Array, pool: Tree, among: jax.Array | int) -> tuple[Tree, jax.Array]:
         """Return a child of two or one of the first `among`, and whether it has two parents []."""
         config = self.config
         key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
@@ -126,7 +130,7 @@ def _with_room(leaf: jax.Array, count: int) -> jax.Array:
     return jnp.concatenate([leaf, jnp.zeros((count, *leaf.shape[1:]), leaf.dtype)])
 
 
-def _holds(pool: Any, size: jax.Array, genome: Any) -> jax.Array:
+def _holds(pool: object, size: jax.Array, genome: object) -> jax.Array:
     """Tell whether [] one of the first `size` of a pool equals a genome."""
     same = [
         jnp.all(leaf == one, axis=tuple(range(1, leaf.ndim)))
@@ -136,7 +140,7 @@ def _holds(pool: Any, size: jax.Array, genome: Any) -> jax.Array:
     return jnp.any(everywhere & (jnp.arange(len(everywhere)) < size))
 
 
-def _either(condition: jax.Array, yes: Any, no: Any) -> Any:
+def _either(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), yes, no)
 
 
@@ -195,18 +199,18 @@ def first_of_kind(
     if same == "genome":
         return by_genome
     of_old, of_new = state.terms, verdicts
-    worth: Any = of_old, of_new
+    worth: tuple[object, object] = of_old, of_new
     if variation.price is not None:
         worth = (of_old, variation.price(old)), (of_new, variation.price(new))
     judged = jnp.isfinite(together(of_old, of_new)).all((1, 2))
     return jnp.where(state.forced, by_genome, _new_first(*worth) & judged & (itself | ~anew))
 
 
-def together(old: Any, new: Any) -> Any:
+def together(old: Tree, new: Tree) -> Tree:
     """Concatenate leaves [P, ...] and [M, ...] to [P + M, ...]."""
     return jax.tree.map(lambda a, b: jnp.concatenate([a, b]), old, new)
 
 
-def _new_first(old: Any, new: Any) -> jax.Array:
+def _new_first(old: object, new: object) -> jax.Array:
     """Tell for each of both [P + M] whether it is the first of its kind, the new before the old."""
     return jnp.roll(first_occurrence(together(new, old)), len(jax.tree.leaves(old)[0]))

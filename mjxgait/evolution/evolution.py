@@ -7,7 +7,6 @@ slots in another way, chosen by a flag in the state.
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -34,7 +33,7 @@ from mjxgait.evolution.state import (
     metrics,
 )
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Judged
+from mjxgait.types import Judged, Tree
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -170,7 +169,7 @@ class Evolution:
         """Number [] of genomes evaluated for the first generation."""
         return jnp.asarray(self.config.initial_choice * self.config.population)
 
-    def _fitness(self, genomes: Any, terms: jax.Array, generation: jax.Array) -> jax.Array:
+    def _fitness(self, genomes: object, terms: jax.Array, generation: jax.Array) -> jax.Array:
         worth, price = self.rank(terms, generation), self.variation.price
         return worth if price is None else worth - price(genomes)
 
@@ -182,7 +181,7 @@ class Evolution:
 
     def _offspring(
         self, key: jax.Array, state: EvolutionState, seeding: jax.Array
-    ) -> tuple[Any, jax.Array, jax.Array | None]:
+    ) -> tuple[object, jax.Array, jax.Array | None]:
         """Return genomes [M, ...], their origins and their mothers' places [M].
 
         The genomes are the unevaluated initial population, forced offspring, or children.
@@ -208,7 +207,7 @@ class Evolution:
 
     def _children(
         self, key: jax.Array, state: EvolutionState
-    ) -> tuple[Any, jax.Array, jax.Array | None]:
+    ) -> tuple[object, jax.Array, jax.Array | None]:
         """Return genomes, origins and mothers' places; no places in sequential breeding."""
         config, count = self.config, self.config.offspring
         if config.pool == "growing" or config.unique_children:
@@ -237,8 +236,8 @@ class Evolution:
         return _pick(mutates, mutated, child), origin, mothers
 
     def _forced(
-        self, keys: jax.Array, state: EvolutionState, created: Any
-    ) -> tuple[Any, jax.Array, jax.Array]:
+        self, keys: jax.Array, state: EvolutionState, created: object
+    ) -> tuple[object, jax.Array, jax.Array]:
         """Return immigrants and repeatedly mutated genomes, origins, and the mutants' parents.
 
         keys: [1 + mutations].
@@ -248,7 +247,7 @@ class Evolution:
         drawn = jax.random.randint(keys[0], (count,), 0, self.config.population)
         mutants = jax.tree.map(lambda leaf: leaf[drawn], state.genomes)
 
-        def mutated(mutants: Any, key: jax.Array) -> tuple[Any, None]:
+        def mutated(mutants: object, key: jax.Array) -> tuple[object, None]:
             return jax.vmap(self.variation.mutate)(jax.random.split(key, count), mutants), None
 
         mutants, _ = jax.lax.scan(mutated, mutants, keys[1:])
@@ -357,7 +356,7 @@ def _own(state: EvolutionState) -> jax.Array:
     return jnp.arange(state.fitness.shape[0])
 
 
-def _pick(condition: jax.Array, yes: Any, no: Any) -> Any:
+def _pick(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
     """Choose row by row [M] from one of two pytrees of leaves [M, ...]."""
     return jax.tree.map(
         lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no

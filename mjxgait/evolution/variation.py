@@ -8,7 +8,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -17,7 +17,9 @@ import numpy as np
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.traced import chosen
 from mjxgait.evolution.chance import key_of
-from mjxgait.types import pytree
+from mjxgait.types import Tree, pytree
+
+Genome = TypeVar("Genome")
 
 
 @pytree
@@ -29,7 +31,7 @@ class Box:
 
 
 @dataclasses.dataclass(frozen=True)
-class Variation:
+class Variation(Generic[Genome]):
     """Operators that evolution calls; a genome is only a pytree to them.
 
     create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key,
@@ -38,14 +40,14 @@ class Variation:
     first: genomes [G, ...] that take the first places of the first generation; None: all are drawn.
     """
 
-    create: Callable[[jax.Array, int], Any]
-    cross: Callable[[jax.Array, Any, Any], Any]
-    mutate: Callable[[jax.Array, Any], Any]
-    price: Callable[[Any], jax.Array] | None = None
+    create: Callable[[jax.Array, int], Genome]
+    cross: Callable[[jax.Array, Genome, Genome], Genome]
+    mutate: Callable[[jax.Array, Genome], Genome]
+    price: Callable[[Genome], jax.Array] | None = None
     long: bool = False
-    first: Any = None
+    first: Genome | None = None
 
-    def begin(self, key: jax.Array, count: int) -> Any:
+    def begin(self, key: jax.Array, count: int) -> Genome:
         """Return genomes [count, ...] of the first generation: `first`, the rest created."""
         created = self.create(key, count)
         if self.first is None:
@@ -69,13 +71,13 @@ def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], An
 def real_variation(box: Box, config: EvolutionConfig) -> Variation:
     """Return operators for genomes of reals in a box: uniform crossover, Gaussian jumps."""
 
-    def cross(key: jax.Array, mother: Any, father: Any) -> Any:
+    def cross(key: jax.Array, mother: Tree, father: Tree) -> Tree:
         def mixed(key: jax.Array, a: jax.Array, b: jax.Array) -> jax.Array:
             return jnp.where(jax.random.bernoulli(key, 0.5, a.shape), a, b)
 
         return _leafwise(key, mixed, mother, father)
 
-    def mutate(key: jax.Array, genome: Any) -> Any:
+    def mutate(key: jax.Array, genome: Tree) -> Tree:
         def moved(key: jax.Array, values: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
             return jittered(key, values, low, high, config.tuning_rate, config.sigma)
 
@@ -85,7 +87,7 @@ def real_variation(box: Box, config: EvolutionConfig) -> Variation:
     return Variation(create=creation(middle, config), cross=cross, mutate=mutate)
 
 
-def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Any) -> Any:
+def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Tree) -> Tree:
     """Apply the function to a separate key and one array of each tree, leaf by leaf."""
     leaves, shape_of = jax.tree.flatten(trees[0])
     columns = zip(jax.random.split(key, len(leaves)), *map(jax.tree.leaves, trees), strict=True)
@@ -95,13 +97,13 @@ def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Any) -
 def narrowed(box: Box, share: jax.Array | float) -> Box:
     """Return the middle of a box, `share` of its width in every gene."""
 
-    def edge(near: Any, far: Any) -> Any:
+    def edge(near: Tree, far: Tree) -> Tree:
         return jax.tree.map(lambda a, b: a + 0.5 * (1 - share) * (b - a), near, far)
 
     return Box(edge(box.low, box.high), edge(box.high, box.low))
 
 
-def in_ranges(genomes: Any, box: Box) -> np.ndarray:
+def in_ranges(genomes: object, box: Box) -> np.ndarray:
     """Return genomes [N, ...] as rows [N, genes], each gene in units of its range."""
     scaled = jax.tree.map(
         lambda leaf, low, high: np.asarray((leaf - low) / jnp.maximum(high - low, 1e-9)),
@@ -154,7 +156,7 @@ def jittered(
     )
 
 
-def first_occurrence(genomes: Any) -> jax.Array:
+def first_occurrence(genomes: object) -> jax.Array:
     """Tell for each genome [N] (leaves [N, ...]) whether it is the first of its kind.
 
     Sorts by a random projection, so the cost grows as N log N. Equal genomes have equal

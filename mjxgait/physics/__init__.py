@@ -1,7 +1,7 @@
 """Batched rigid-body physics behind the `Plant` protocol."""
 
 import copy
-from typing import Any
+from typing import TypeVar
 
 import mujoco
 from numpy.typing import ArrayLike
@@ -14,6 +14,8 @@ from mjxgait.physics.derived import OtherTopology, sense_layout
 from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
 from mjxgait.physics.lane_major.model import check_supported
 from mjxgait.types import ModelPlant
+
+Parameters = TypeVar("Parameters")
 
 SLOWER = "15 to 30"
 """Factor by which plain MJX is slower per creature-step (docs/research/performance.md)."""
@@ -50,7 +52,9 @@ def make_plant(
         ) from None
 
 
-def parameters_of(plant: ModelPlant, creature: Creature, touch_ends: bool) -> Any:
+def parameters_of(
+    plant: ModelPlant[object, Parameters], creature: Creature, touch_ends: bool
+) -> Parameters:
     """Return the numbers of a creature for the plant of another one of the same topology.
 
     Raises:

@@ -4,7 +4,7 @@ One step is split around the controller.
 """
 
 import dataclasses
-from typing import Any, Self
+from typing import Self
 
 import jax
 import jax.numpy as jnp
@@ -78,11 +78,11 @@ class MjxPlant:
         large = resized(self.model, self.layout, self.crossings, parameters, factor)
         return reweighed(self.model, self.data, large)
 
-    def forward(self, state: BodyState) -> tuple[Sensed, Any]:
+    def forward(self, state: BodyState) -> tuple[Sensed, mjx.Data]:
         """See `Plant.forward`."""
         return jax.vmap(self._forward)(state)
 
-    def solve_damped(self, workings: Any, damping: jax.Array, force: jax.Array) -> jax.Array:
+    def solve_damped(self, workings: mjx.Data, damping: jax.Array, force: jax.Array) -> jax.Array:
         """See `Plant.solve_damped`."""
 
         def solve(data: mjx.Data, damping: jax.Array, rhs: jax.Array) -> jax.Array:
@@ -91,7 +91,7 @@ class MjxPlant:
 
         return jax.vmap(solve)(workings, damping, force)
 
-    def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
+    def advance(self, state: BodyState, workings: mjx.Data, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
         return jax.vmap(self._advance)(state, workings, torque)
 

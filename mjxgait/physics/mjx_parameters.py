@@ -4,7 +4,6 @@ import contextlib
 import dataclasses
 import io
 from collections.abc import Mapping
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -110,7 +109,7 @@ def model_difference(own: mjx.Model, other: mjx.Model) -> str:
     return next((f"its {name} differs in shape" for name, a, b in shapes if a.shape != b.shape), "")
 
 
-def _equal(a: Any, b: Any) -> bool:
+def _equal(a: object, b: object) -> bool:
     ours, theirs = jax.tree.leaves(a), jax.tree.leaves(b)
     return len(ours) == len(theirs) and all(map(np.array_equal, ours, theirs))
 

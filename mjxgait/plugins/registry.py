@@ -10,7 +10,7 @@ import numpy as np
 
 from mjxgait.config import layers
 from mjxgait.config.schema import Config, RolloutConfig, UseConfig
-from mjxgait.config.tables import STRICT, build
+from mjxgait.config.tables import STRICT, Table, build
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.kinds import controller_kind, meant_of_grown, task_kind
@@ -45,7 +45,7 @@ def meant(use: UseConfig) -> UseConfig:
 
 def make_controller(body: "Body", step: float, config: Config) -> "Controller":
     """Return the creature's controller. step: s between two control steps."""
-    kind: Any = find("controller", config.use.controller)
+    kind = find("controller", config.use.controller)
     added = getattr(find("task", config.use.task), "adds", ())
     # `told` passes settings and observations to controllers with a genome that depends on them.
     told = getattr(kind, "told", None)
@@ -56,7 +56,7 @@ def make_controller(body: "Body", step: float, config: Config) -> "Controller":
 def make_task(body: "Body", step: float, ends: "Termination | Ends", config: Config) -> "Task":
     """Return the creature's task. ends: the termination conditions."""
     horizon = max(round(config.rollout.seconds / step), 1)
-    kind: Any = find("task", config.use.task)
+    kind = find("task", config.use.task)
     # `told` passes the settings to tasks with episode statistics that depend on them.
     told = getattr(kind, "told", None)
     made: Task = (
@@ -106,7 +106,7 @@ def _config_class(tables: tuple[tuple[str, type], ...]) -> type[Config]:
     return made
 
 
-def build_config(table: Mapping[str, Any], where: str) -> Config:
+def build_config(table: Table, where: str) -> Config:
     """Return the config of a table, with the settings of the controller and the task it names.
 
     Raises:
@@ -117,7 +117,7 @@ def build_config(table: Mapping[str, Any], where: str) -> Config:
 
 
 def resolve_config(
-    creature_table: Mapping[str, Any],
+    creature_table: Table,
     creature_name: str,
     file: Path | None = None,
     use: Mapping[str, str] | None = None,

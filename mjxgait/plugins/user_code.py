@@ -46,7 +46,7 @@ class SameCode:
         self.every: int = controller.every
         self.first, self.tree = jax.tree.flatten(jax.device_get(controller.init()))
 
-        def act(memory: Any, senses: Any) -> tuple[jax.Array, Any]:
+        def act(memory: object, senses: Mapping[str, jax.Array]) -> tuple[jax.Array, object]:
             return controller.act(plan, memory, senses)
 
         self.program = jax.jit(jax.vmap(act))

@@ -1,15 +1,16 @@
 """Evaluation of genomes: the one contract between evolution and a simulation backend."""
 
 import dataclasses
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import jax
 import jax.numpy as jnp
 
 from mjxgait.config.schema import Config
 from mjxgait.simulation.rollout import Episodes, Simulator
-from mjxgait.tasks.base import FINISHED, NONFINITE, in_order
+from mjxgait.tasks.base import FINISHED, NONFINITE, Tally, in_order
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Asked, Judged
 
@@ -18,7 +19,7 @@ class Evaluator(Protocol):
     """Evaluator of the genomes of several evolution runs, the rows `B`."""
 
     def judge(
-        self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
+        self, genomes: object, trials: Starts, settings: Config, asked: Asked | None = None
     ) -> Judged:
         """Return the results, leaves [B, N, ...], of genomes [B, N, ...] in the trials [B, R].
 
@@ -34,7 +35,7 @@ class Local:
     simulator: Simulator
 
     def judge(
-        self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
+        self, genomes: object, trials: Starts, settings: Config, asked: Asked | None = None
     ) -> Judged:
         """See `Evaluator`. Outside the simulations, each row reads only its own data."""
         wanted = None if asked is None else jnp.asarray(asked.wanted)
@@ -44,7 +45,7 @@ class Local:
         share = lived / jnp.maximum(jnp.sum(lived), 1)
         computed = jnp.round(episodes.computed_steps * share).astype(jnp.int32)
 
-        def of_row(row: tuple[Config, Any, jax.Array]) -> Judged:
+        def of_row(row: tuple[Config, Tally, jax.Array]) -> Judged:
             settings, tally, computed = row
             return self.verdict(settings, Episodes(tally, computed))
 
@@ -55,7 +56,9 @@ class Local:
         """Return the results of one row's episodes, statistics with leaves [N, R, ...]."""
         task, tally = self.simulator.task, episodes.tally
 
-        def each(function: Any, names: tuple[str, ...]) -> jax.Array:
+        def each(
+            function: Callable[[Tally], Mapping[str, jax.Array]], names: tuple[str, ...]
+        ) -> jax.Array:
             return jax.vmap(jax.vmap(lambda one: in_order(function(one), names)))(tally)
 
         terms = each(partial(task.judge, settings=settings.fitness), task.terms)

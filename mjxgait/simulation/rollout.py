@@ -19,14 +19,15 @@ from jax.sharding import Mesh, PartitionSpec
 from mjxgait.config.schema import Config
 from mjxgait.controllers.base import Controller
 from mjxgait.controllers.observations import sense
-from mjxgait.controllers.spd import Drive, Rules, per_lane
+from mjxgait.controllers.spd import Drive, Function, Rules, per_lane
 from mjxgait.creature.body import Body
-from mjxgait.tasks.base import FINISHED, NONFINITE, Task
+from mjxgait.tasks.base import FINISHED, NONFINITE, Tally, Task
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import (
     BodyState,
     Plant,
     Sensed,
+    Tree,
     pytree,
 )
 
@@ -66,11 +67,11 @@ class Lane:
 
     job: jax.Array
     body: BodyState
-    plan: Any
-    memory: Any
-    tally: Any
-    aim: Any
-    standards: Any
+    plan: object
+    memory: object
+    tally: Tally
+    aim: object
+    standards: object
     rules: Rules
     push: jax.Array
     push_step: jax.Array
@@ -94,10 +95,10 @@ class Simulator:
     steps: int
     lanes: int
     mesh: Mesh
-    bodies: Callable[[Any, Starts], Starts] | None = None
+    bodies: Callable[[object, Starts], Starts] | None = None
 
     def simulate(
-        self, genomes: Any, starts: Starts, settings: Config, wanted: jax.Array | None = None
+        self, genomes: object, starts: Starts, settings: Config, wanted: jax.Array | None = None
     ) -> Episodes:
         """Simulate every genome (leaves [B, N, ...]) on every start [B, R] of its row.
 
@@ -132,7 +133,7 @@ class Simulator:
         return Episodes(jax.tree.map(in_order, tally), jnp.sum(computed))
 
     def _turns(
-        self, plans: Any, shape: tuple[int, ...], wanted: jax.Array | None = None
+        self, plans: object, shape: tuple[int, ...], wanted: jax.Array | None = None
     ) -> jax.Array | None:
         """Return the order [B * N * R] in which episodes are simulated; None where all are alike.
 
@@ -145,7 +146,7 @@ class Simulator:
         last = each if wanted is None else jnp.where(wanted, each, jnp.inf)
         return jnp.argsort(last.reshape(-1)).astype(jnp.int32)
 
-    def _own_starts(self, genomes: Any, starts: Starts) -> Starts | None:
+    def _own_starts(self, genomes: object, starts: Starts) -> Starts | None:
         """Return each genome's own starts [B, N, R, ...]; None where all bodies are the plant's."""
         if self.bodies is None:
             return None
@@ -155,13 +156,13 @@ class Simulator:
     def _run_queue(
         self,
         jobs: jax.Array,
-        plans: Any,
+        plans: object,
         starts: Starts,
         settings: Config,
         own: Starts | None,
         *,
         total: int,
-    ) -> tuple[Any, jax.Array]:
+    ) -> tuple[Tally, jax.Array]:
         """Run one device's queue of jobs [Q].
 
         Return the statistics, leaves [Q, ...], and the computed steps [1].
@@ -177,7 +178,7 @@ class Simulator:
             )
             return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
 
-        def store(results: Any, place: jax.Array, tally: Any) -> Any:
+        def store(results: Tally, place: jax.Array, tally: Tally) -> Tally:
             return jax.tree.map(
                 lambda rows, leaf: rows.at[place].set(
                     jnp.moveaxis(leaf, self.plant.lane_axis, 0), mode="drop"
@@ -187,8 +188,8 @@ class Simulator:
             )
 
         def body(
-            carry: tuple[Lane, Any, jax.Array, jax.Array],
-        ) -> tuple[Lane, Any, jax.Array, jax.Array]:
+            carry: tuple[Lane, Tally, jax.Array, jax.Array],
+        ) -> tuple[Lane, Tally, jax.Array, jax.Array]:
             lane, results, taken, rounds = carry
             lane = jax.lax.fori_loop(0, CHECK_EVERY, self._step, lane)
             lane = self._look_for_overlap(lane)
@@ -218,7 +219,7 @@ class Simulator:
 
     def _fresh_lane(
         self,
-        plans: Any,
+        plans: object,
         starts: Starts,
         settings: Config,
         own: Starts | None,
@@ -286,10 +287,10 @@ class Simulator:
             lane, body=body, memory=memory, tally=tally, aim=aim, command=kept, late=late
         )
 
-    def _command(self, k: jax.Array, lane: Lane, sensed: Sensed) -> tuple[jax.Array, Any]:
+    def _command(self, k: jax.Array, lane: Lane, sensed: Sensed) -> tuple[jax.Array, object]:
         """Return the commands of a step, and the controllers' memories."""
 
-        def asked() -> tuple[jax.Array, Any]:
+        def asked() -> tuple[jax.Array, object]:
             return self._per_lane(self._act)(lane, sensed)
 
         if not self._holds:
@@ -297,7 +298,7 @@ class Simulator:
         due = k % self.controller.every == 0
         return jax.lax.cond(due, asked, lambda: (lane.command, lane.memory))
 
-    def _act(self, lane: Lane, sensed: Sensed) -> tuple[jax.Array, Any]:
+    def _act(self, lane: Lane, sensed: Sensed) -> tuple[jax.Array, object]:
         """Return the controller's command [J] and its memory."""
         time, names = lane.tally.steps * self.drive.step, self.controller.reads
         senses = sense(self.creature, sensed, time, names)
@@ -312,12 +313,12 @@ class Simulator:
         deeper = jnp.where(going & (depth > tally.overlap), depth, tally.overlap)
         return dataclasses.replace(lane, tally=dataclasses.replace(tally, overlap=deeper))
 
-    def reason(self, sensed: Sensed, aim: Any) -> jax.Array:
+    def reason(self, sensed: Sensed, aim: object) -> jax.Array:
         """Return why [] an episode ends now; `FINISHED` while it goes on."""
         ended = self.task.ended(sensed, aim)
         return jnp.where(_finite(sensed), ended, NONFINITE).astype(jnp.int32)
 
-    def _judge(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> Any:
+    def _judge(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> Tally:
         """Update the statistics after a step, unless the episode has ended."""
         tally = lane.tally
         going = (tally.reason == FINISHED) & (tally.steps < self.steps)
@@ -326,7 +327,7 @@ class Simulator:
         kept = dataclasses.replace(tally, reason=jnp.where(going, reason, tally.reason))
         return _choose(going & (reason == FINISHED), updated, kept)
 
-    def _per_lane(self, function: Callable[..., Any]) -> Callable[..., Any]:
+    def _per_lane(self, function: Function) -> Function:
         return per_lane(self.plant, function)
 
 
@@ -336,7 +337,7 @@ def _finite(sensed: Sensed) -> jax.Array:
     return jnp.isfinite(sum(jnp.sum(part) for part in seen))
 
 
-def _choose(condition: jax.Array, yes: Any, no: Any) -> Any:
+def _choose(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
     return jax.tree.map(partial(jnp.where, condition), yes, no)
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
-from typing import Any, Protocol
+from typing import Protocol, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -36,7 +36,13 @@ class Tally:
     overlap: jax.Array
 
 
-class Task(Protocol):
+Settings_contra = TypeVar("Settings_contra", contravariant=True)
+Aim = TypeVar("Aim")
+Standards = TypeVar("Standards")
+Stats = TypeVar("Stats", bound=Tally)
+
+
+class Task(Protocol[Settings_contra, Aim, Standards, Stats]):
     """Task of one creature.
 
     Every method but `trials` is for one episode, and is mapped over lanes and episodes.
@@ -66,11 +72,11 @@ class Task(Protocol):
         """Curriculum flag: trials become harder as the best individuals pass them."""
         ...
 
-    def levels(self, settings: Any) -> jax.Array | int:
+    def levels(self, settings: Settings_contra) -> jax.Array | int:
         """Number [] of times that trials become harder."""
         ...
 
-    def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
+    def harder(self, trials: Starts, settings: Settings_contra, level: jax.Array) -> Starts:
         """Return the trials [R, ...] at this level [] of the curriculum."""
         ...
 
@@ -78,45 +84,45 @@ class Task(Protocol):
         """Return whether [] these terms, means over an individual's trials, allow harder trials."""
         ...
 
-    def aim(self, trial: Starts) -> Any:
+    def aim(self, trial: Starts) -> Aim:
         """Data of the trial besides the start: a goal, a light; () if none."""
         ...
 
-    def standards(self, settings: Any) -> Any:
+    def standards(self, settings: Settings_contra) -> Standards:
         """Task parameters that an episode keeps, plain or traced."""
         ...
 
-    def senses(self, aim: Any, sensed: Sensed) -> Mapping[str, jax.Array]:
+    def senses(self, aim: Aim, sensed: Sensed) -> Mapping[str, jax.Array]:
         """Observations that the task adds, by name."""
         ...
 
-    def onward(self, aim: Any, sensed: Sensed) -> Any:
+    def onward(self, aim: Aim, sensed: Sensed) -> Aim:
         """Goal from the next step on."""
         ...
 
-    def init(self) -> Any:
+    def init(self) -> Stats:
         """Return the empty episode statistics."""
         ...
 
-    def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
+    def ended(self, sensed: Sensed, aim: Aim) -> jax.Array:
         """Reason [] to end the episode now; `FINISHED` continues it."""
         ...
 
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
-    ) -> Any:
+        self, tally: Stats, sensed: Sensed, torque: jax.Array, standards: Standards, aim: Aim
+    ) -> Stats:
         """Return the statistics after one more step under this torque [J] in N·m."""
         ...
 
-    def judge(self, tally: Any, settings: Any) -> Mapping[str, jax.Array]:
+    def judge(self, tally: Stats, settings: Settings_contra) -> Mapping[str, jax.Array]:
         """Fitness terms [] of an episode by name, each without unit and before its weight."""
         ...
 
-    def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
+    def outcome(self, tally: Stats) -> Mapping[str, jax.Array]:
         """Metrics by name, in m, s or counts; never a score converted back."""
         ...
 
-    def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
+    def weights(self, settings: Settings_contra, generation: jax.Array) -> Mapping[str, jax.Array]:
         """Weight of each term [] at a generation; penalties are negative."""
         ...
 

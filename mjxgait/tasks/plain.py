@@ -61,7 +61,7 @@ class PlainTask(abc.ABC):
         """See `Task`."""
         return jnp.zeros((), bool)
 
-    def aim(self, trial: Starts) -> Any:
+    def aim(self, trial: Starts) -> object:
         """See `Task`."""
         return ()
 
@@ -77,7 +77,7 @@ class PlainTask(abc.ABC):
         """See `Task`: the same."""
         return aim
 
-    def init(self) -> Any:
+    def init(self) -> Tally:
         """See `Task`."""
         none = jnp.zeros((), jnp.int32)
         return Tally(steps=none, reason=none, overlap=jnp.zeros(()))

@@ -1,7 +1,6 @@
 """Initial conditions of the trials, shared by all individuals: first nominal, others perturbed."""
 
 import dataclasses
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -50,7 +49,7 @@ class Starts:
     damping: jax.Array
     ground: Ground | None = None
     heaviness: jax.Array | None = None
-    numbers: Any = None
+    numbers: object = None
     goal: jax.Array | None = None
     raised: jax.Array | None = None
     light: jax.Array | None = None

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -36,17 +36,20 @@ from mjxgait.tasks.base import Task
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import ModelPlant, Plant, pytree
 
+PlantOf_contra = TypeVar("PlantOf_contra", contravariant=True)
+Genome_contra = TypeVar("Genome_contra", contravariant=True)
 
-class Growth(Protocol):
+
+class Growth(Protocol[PlantOf_contra, Genome_contra]):
     """Computation of the simulated body from a genome."""
 
-    def body(self, plant: Any, genome: Any, start: Starts) -> Starts:
+    def body(self, plant: PlantOf_contra, genome: Genome_contra, start: Starts) -> Starts:
         """Return the start [] with the genome's own body."""
         ...
 
 
 @dataclasses.dataclass(frozen=True)
-class GraphGrowth(Growth):
+class GraphGrowth(Growth[TreePlant, Genotype]):
     """Modular bodies from graphs."""
 
     capacity: Capacity
@@ -60,7 +63,7 @@ class GraphGrowth(Growth):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class SizeGrowth(Growth):
+class SizeGrowth(Growth[ModelPlant, Bodied]):
     """Body parameters from evolved sizes, and a start with its height above ground kept."""
 
     proportions: Proportions
@@ -106,7 +109,7 @@ class Numbers:
 
     body: GivenBody
     ends: Ends
-    plant: Any
+    plant: object
 
 
 class Plan(Protocol):

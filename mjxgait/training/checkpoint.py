@@ -11,7 +11,6 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
@@ -102,7 +101,11 @@ def pack(state: EvolutionState) -> Packed:
     return Packed(jax.device_get(_by_name(state)), impl)
 
 
-def _by_name(state: EvolutionState) -> dict[str, Any]:
+Shaped = np.ndarray | jax.Array | jax.ShapeDtypeStruct
+"""Something with a shape and a type."""
+
+
+def _by_name(state: EvolutionState) -> dict[str, Shaped]:
     """Return the arrays of a state by dotted name; its typed key as numbers."""
     key = state.key
     plain = (
@@ -114,7 +117,7 @@ def _by_name(state: EvolutionState) -> dict[str, Any]:
     return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
 
 
-def _check_shapes(found: Mapping[str, Any], wanted: Mapping[str, Any], where: str) -> None:
+def _check_shapes(found: Mapping[str, Shaped], wanted: Mapping[str, Shaped], where: str) -> None:
     """Refuse a state with other arrays than the settings require.
 
     Raises:
@@ -161,7 +164,7 @@ class Checkpoints:
                 self._folder, options=options, item_handlers=handlers
             )
         self._beginner = ThreadPoolExecutor(1, "checkpoints")
-        self._begun: Future[Any] = Future()
+        self._begun: Future[object] = Future()
         self._begun.set_result(None)
 
     def generations(self) -> list[int]:
@@ -266,7 +269,7 @@ class _WithoutClosedLoops:
     Orbax closes its event loop at the first error; TensorStore's native threads still report to it.
     """
 
-    def __init__(self, before: Callable[["sys.UnraisableHookArgs"], Any]) -> None:
+    def __init__(self, before: Callable[["sys.UnraisableHookArgs"], object]) -> None:
         self._before = before
 
     def __call__(self, error: "sys.UnraisableHookArgs", /) -> None:

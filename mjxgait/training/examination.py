@@ -5,7 +5,6 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from mjxgait.config.schema import Config, ExaminationConfig
 from mjxgait.config.tables import STORED, Flag, Index, Text
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.training.experiment import Experiment
-from mjxgait.training.folder import read_records, write_lines
+from mjxgait.training.folder import Line, read_records, write_lines
 from mjxgait.training.prescreen import Tryout
 from mjxgait.training.stored import disk_errors
 
@@ -69,7 +68,7 @@ class Exams:
         lines = sorted(self._lines(), key=lambda line: line["generation"])
         return [line["champion"] for line in lines if line["generation"] <= generation]
 
-    def _lines(self) -> list[dict[str, Any]]:
+    def _lines(self) -> list[Line]:
         return read_records(self.path, _Exam)
 
 

@@ -5,7 +5,7 @@ import dataclasses
 import hashlib
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from functools import cached_property, partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -36,7 +36,7 @@ from mjxgait.training.stages import (
     lower_stages,
     lowered,
 )
-from mjxgait.types import Asked
+from mjxgait.types import Asked, Tree
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Shape:
     """
 
     body: str
-    settings: Any
+    settings: Hashable
     code: tuple[Hashable, ...]
 
     def name(self, *more: Hashable) -> str:
@@ -139,7 +139,7 @@ class Experiment:
         known = (self.blueprint.numbers, self.row.settings)
         return *known, jax.random.fold_in(key, island) if island else key
 
-    def simulate(self, genomes: Any, starts: Starts | None = None) -> Episodes:
+    def simulate(self, genomes: object, starts: Starts | None = None) -> Episodes:
         """Simulate genomes [N, ...] on starts [R], by default the run's.
 
         The episodes have leaves [N, R, ...].
@@ -210,7 +210,7 @@ class Experiment:
         )
 
 
-def arrays_of(genome: Any) -> dict[str, np.ndarray]:
+def arrays_of(genome: object) -> dict[str, np.ndarray]:
     """Return the arrays of a genome by dotted name, as in checkpoints."""
     leaves = jax.tree_util.tree_leaves_with_path(genome)
     return {
@@ -264,7 +264,7 @@ class Batch:
         return partial(stages.step, *self.known, evaluator=evaluator)
 
     def lower_judge(
-        self, genomes: Any, starts: Starts, asked: Asked | None = None
+        self, genomes: object, starts: Starts, asked: Asked | None = None
     ) -> jax.stages.Lowered:
         """Lower the program that evaluates genomes [B, N, ...]; see `generation.judge`."""
         given = (self.rows.settings, starts, genomes)
@@ -347,15 +347,15 @@ def _experiment(creature: Creature, blueprint: Plan, config: Config) -> Experime
     return Experiment(creature, config, blueprint, Row(traced(config), starts))
 
 
-def _lone(tree: Any) -> Any:
+def _lone(tree: Tree) -> Tree:
     """Add an axis of one row [1, ...] to all leaves."""
     return jax.tree.map(lambda leaf: leaf[None], tree)
 
 
-def _only(tree: Any) -> Any:
+def _only(tree: Tree) -> Tree:
     """Remove the axis of one row from all leaves."""
     return jax.tree.map(lambda leaf: leaf[0], tree)
 
 
-def _stack(trees: Sequence[Any]) -> Any:
+def _stack(trees: Sequence[Tree]) -> Tree:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)

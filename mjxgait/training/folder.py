@@ -100,6 +100,10 @@ class Numbered:
     generation: Annotated[int, pydantic.Field(strict=True)]
 
 
+Line = dict[str, Any]
+"""A JSON object by name: a line of an append-only file."""
+
+
 @dataclasses.dataclass(frozen=True)
 class _Metrics:
     """Schema of a line of `metrics.jsonl`; all further fields are numbers."""
@@ -231,7 +235,7 @@ def kept_champion(folder: Path, creature: Creature) -> Champion:
         raise UserError(f"{error}; write it anew with: {again}") from None
 
 
-def read_metrics(path: Path) -> list[dict[str, Any]]:
+def read_metrics(path: Path) -> list[Line]:
     """Return the lines of a `metrics.jsonl`, without a last line that a kill cut off.
 
     Raises:
@@ -245,7 +249,7 @@ def read_metrics(path: Path) -> list[dict[str, Any]]:
     return lines
 
 
-def read_records(path: Path, schema: type) -> list[dict[str, Any]]:
+def read_records(path: Path, schema: type) -> list[Line]:
     """Return the lines of an append-only file, checked by schema; see `files.read_lines`."""
     lines = read_lines(path)
     for number, line in enumerate(lines, 1):
@@ -259,7 +263,7 @@ def truncate_metrics(path: Path, generation: int) -> None:
     write_lines(path, kept)
 
 
-def write_lines(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
+def write_lines(path: Path, lines: Iterable[Mapping[str, object]]) -> None:
     """Write a file at once, with one JSON object per line."""
     write_text(path, "".join(json.dumps(line) + "\n" for line in lines))
 

@@ -181,7 +181,7 @@ def absorb(
     return jax.lax.map(of_row, (rows, states, proposals, judged))
 
 
-def climbed(task: Task, settings: Any, state: EvolutionState) -> EvolutionState:
+def climbed(task: Task, settings: object, state: EvolutionState) -> EvolutionState:
     """Raise the curriculum level after a generation if most of the best have passed it.
 
     The old level was easier, so fitness at that level is then discarded: all survivors are

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
@@ -36,6 +35,7 @@ from mjxgait.training.folder import (
     METRICS,
     MOTHERS,
     STRESS,
+    Line,
     keep_body,
     kept_champion,
     read_metrics,
@@ -233,7 +233,7 @@ def _generation(
     return state
 
 
-def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> dict[str, Any]:
+def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> Line:
     """Return the line of `metrics.jsonl` for a generation; non-finite numbers become null."""
     line = {
         field.name: getattr(metrics, field.name).item()

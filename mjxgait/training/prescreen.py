@@ -7,7 +7,6 @@ to test it. So candidates are validated there in the order of their results here
 import dataclasses
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -110,7 +109,7 @@ class Tryout:
     def _compile(self) -> jax.stages.Compiled:
         count = self.run.config.examination.candidates
 
-        def some(leaf: Any) -> Any:
+        def some(leaf: jax.ShapeDtypeStruct) -> jax.ShapeDtypeStruct:
             return jax.ShapeDtypeStruct((1, count, *leaf.shape[1:]), leaf.dtype)
 
         genomes = jax.tree.map(some, self._trials.abstract().genomes)

@@ -1,10 +1,10 @@
 """Progress output of a run: a live line in a terminal, elsewhere one plain line per generation."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -23,8 +23,12 @@ from mjxgait.training.folder import (
     CREATURE,
     METRICS,
     PLOT,
+    Line,
     command,
 )
+
+if TYPE_CHECKING:
+    from mjxgait.training.experiment import Experiment
 
 
 class Screen:
@@ -37,7 +41,7 @@ class Screen:
         self._first: tuple[float, int] | None = None
 
     @contextmanager
-    def compiling(self, what: str, experiment: Any) -> Iterator[None]:
+    def compiling(self, what: str, experiment: "Experiment") -> Iterator[None]:
         """Show that the program is being compiled, and the time it takes."""
         config = experiment.config
         self.console.print(
@@ -59,7 +63,7 @@ class Screen:
         """Print a line."""
         self.console.print(text)
 
-    def generation(self, line: Mapping[str, Any], config: Config) -> None:
+    def generation(self, line: Line, config: Config) -> None:
         """Show a generation of a run with these settings; see `metrics_line`."""
         last, sooner = config.evolution.generations, what_ends_sooner(config)
         if not self._walls:
@@ -87,7 +91,7 @@ class Screen:
         else:
             self.console.print(text)
 
-    def _seconds(self, line: Mapping[str, Any]) -> float:
+    def _seconds(self, line: Line) -> float:
         """Return the expected time of a generation in s.
 
         It is the larger of two means: the latest logged times, and the time since the first line,
@@ -143,9 +147,7 @@ class Screen:
             "The margin is that of the tightest measure: 0 just passes, 1 is far from its threshold."
         )
 
-    def report(
-        self, folder: Path, why: str, last: Mapping[str, Any], seconds: float, interrupted: bool
-    ) -> None:
+    def report(self, folder: Path, why: str, last: Line, seconds: float, interrupted: bool) -> None:
         """Print the final table: results and file locations.
 
         last: the last line of the metrics.
@@ -202,14 +204,14 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
-def _best(last: Mapping[str, Any]) -> str:
+def _best(last: Line) -> str:
     """Return the best fitness in words; none if no individual could be evaluated."""
     if last["best"] is None:
         return f"none: no individual had a finite fitness in generation {last['generation']}"
     return f"{last['best']:.3f} in generation {last['generation']}"
 
 
-def _outcome(last: Mapping[str, Any]) -> str:
+def _outcome(last: Line) -> str:
     """Return the metrics of the best in m, s or counts, as text."""
     prefix = "outcome_"
     named = {k.removeprefix(prefix): v for k, v in last.items() if k.startswith(prefix)}

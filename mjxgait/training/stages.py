@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
-from typing import Any, Literal
+from typing import Literal
 
 import jax
 from jax.sharding import NamedSharding, PartitionSpec
@@ -129,7 +129,7 @@ class CompiledGeneration:
         return after
 
 
-def lowered(blueprint: Plan, function: Callable[..., Any], *given: Any) -> jax.stages.Lowered:
+def lowered(blueprint: Plan, function: Callable[..., object], *given: object) -> jax.stages.Lowered:
     """Lower a part of a generation for these shapes.
 
     The program is the same for all settings with these shapes, so the compiler's cache has it.

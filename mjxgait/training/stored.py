@@ -17,10 +17,11 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 import tensorstore
+from numpy.typing import ArrayLike
 
 from mjxgait.config.tables import Index, Text, check
 from mjxgait.errors import UserError
@@ -279,7 +280,7 @@ def read_stored(run: Path, digest: str, generation: int | None = None) -> Stored
         raise UserError(f"{folder}: the checkpoint is damaged ({damage}); {way_out}") from None
 
 
-def array_hash(arrays: Mapping[str, Any]) -> str:
+def array_hash(arrays: Mapping[str, ArrayLike]) -> str:
     """Return a hash of named arrays: their names, types, shapes and values."""
     digest = hashlib.sha256()
     for name in sorted(arrays):

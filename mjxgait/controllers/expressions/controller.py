@@ -11,7 +11,7 @@ Letters: `C` nodes, `Q` functions at most, `J` trees, `S` observations.
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -239,11 +239,11 @@ class Programs:
         """See `Controller`: the number of functions in the longest expression."""
         return jnp.max(plan.count)
 
-    def init(self) -> Any:
+    def init(self) -> tuple[()]:
         """See `Controller`: a program has no memory."""
         return ()
 
-    def act(self, plan: Listing, memory: Any, senses: Senses) -> tuple[jax.Array, Any]:
+    def act(self, plan: Listing, memory: tuple[()], senses: Senses) -> tuple[jax.Array, tuple[()]]:
         """See `Controller`: clipped to each joint's pose range."""
         seen = [
             senses[t.sense] if t.index is None else senses[t.sense][t.index] for t in self.known

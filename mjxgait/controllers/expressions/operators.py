@@ -5,12 +5,12 @@ A tree is `code` [C] and `value` [C] (`text`); beyond its end both are zero.
 
 import dataclasses
 from functools import partial
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.controllers.expressions.config import ProgramConfig
 from mjxgait.controllers.expressions.text import ARITY, CONSTANT, EMPTY, FIRST_ADDED, FUNCTION_CODES
 from mjxgait.evolution.variation import Variation
 from mjxgait.types import pytree
@@ -88,7 +88,7 @@ class Growing:
 
 
 def half_and_half(
-    key: jax.Array, words: Words, depth: tuple[int, int], constants: Any
+    key: jax.Array, words: Words, depth: tuple[int, int], constants: tuple[float, float]
 ) -> tuple[jax.Array, jax.Array]:
     """Draw a tree [C], full or grown with equal chance, up to a depth drawn from a range."""
     key_kind, key_depth, key_grow = jax.random.split(key, 3)
@@ -99,7 +99,7 @@ def half_and_half(
 
 
 def grown(
-    key: jax.Array, words: Words, deep: jax.Array, least: jax.Array, constants: Any
+    key: jax.Array, words: Words, deep: jax.Array, least: jax.Array, constants: tuple[float, float]
 ) -> tuple[jax.Array, jax.Array]:
     """Draw a tree [C] with depth at most `deep` [] and terminals at depth `least` [] or more.
 
@@ -116,7 +116,7 @@ def _next_node(
     words: Words,
     deep: jax.Array,
     least: jax.Array,
-    constants: Any,
+    constants: tuple[float, float],
     state: Growing,
     key: jax.Array,
 ) -> tuple[Growing, tuple[jax.Array, jax.Array]]:
@@ -152,7 +152,7 @@ FINEST = 0.01
 
 
 def program_variation(
-    words: Words, joints: int, settings: Any, first: Trees | None = None
+    words: Words, joints: int, settings: ProgramConfig, first: Trees | None = None
 ) -> Variation:
     """Return the operators. settings: `ProgramConfig`, plain or traced. first: see `Variation`."""
 
@@ -186,7 +186,7 @@ def program_variation(
     return Variation(create, cross, mutate, price, long=True, first=first)
 
 
-def crossed(key: jax.Array, mother: Tree, father: Tree, settings: Any) -> Tree:
+def crossed(key: jax.Array, mother: Tree, father: Tree, settings: ProgramConfig) -> Tree:
     """Return the mother with one subtree replaced by one of the father's (Koza 1992).
 
     The mother stays unchanged if the child would be too large or too deep.
@@ -197,7 +197,7 @@ def crossed(key: jax.Array, mother: Tree, father: Tree, settings: Any) -> Tree:
     return spliced(mother, here, father, there, settings.depth)
 
 
-def mutated(key: jax.Array, tree: Tree, words: Words, settings: Any) -> Tree:
+def mutated(key: jax.Array, tree: Tree, words: Words, settings: ProgramConfig) -> Tree:
     """Return the tree with one change; its kind is drawn by the weights of the settings."""
     key_kind, key_place, key_change = jax.random.split(key, 3)
     place = jax.random.randint(key_place, (), 0, jnp.maximum(size(tree[0]), 1))
@@ -217,7 +217,7 @@ def mutated(key: jax.Array, tree: Tree, words: Words, settings: Any) -> Tree:
     return code, value
 
 
-def chosen_node(key: jax.Array, code: jax.Array, at_functions: Any) -> jax.Array:
+def chosen_node(key: jax.Array, code: jax.Array, at_functions: jax.Array | float) -> jax.Array:
     """Draw a node's index []: with chance `at_functions` a function, if any, else a terminal."""
     key_kind, key_node = jax.random.split(key)
     inner = (code != EMPTY) & (arity(code) > 0)
@@ -269,7 +269,7 @@ def functions_at(key: jax.Array, functions: np.ndarray, allowed: jax.Array) -> j
     return jnp.asarray(functions)[jax.random.categorical(key, jnp.where(allowed, 0.0, -jnp.inf))]
 
 
-def _moved(key: jax.Array, tree: Tree, settings: Any) -> Tree:
+def _moved(key: jax.Array, tree: Tree, settings: ProgramConfig) -> Tree:
     """Return the tree with one constant moved; unchanged if it has none."""
     key_which, key_by = jax.random.split(key)
     constants = tree[0] == CONSTANT
@@ -278,7 +278,9 @@ def _moved(key: jax.Array, tree: Tree, settings: Any) -> Tree:
     return tree[0], jnp.where(moves, tree[1] + _step(key_by, settings), tree[1])
 
 
-def _nudged(key: jax.Array, tree: Tree, place: jax.Array, words: Words, settings: Any) -> Tree:
+def _nudged(
+    key: jax.Array, tree: Tree, place: jax.Array, words: Words, settings: ProgramConfig
+) -> Tree:
     """Return the tree with a small constant added to the subtree at a place [], or a factor near 1.
 
     The tree stays unchanged if the settings allow neither sums nor products.
@@ -295,7 +297,7 @@ def _nudged(key: jax.Array, tree: Tree, place: jax.Array, words: Words, settings
     return spliced(tree, place, changed, jnp.int32(0), settings.depth)
 
 
-def _step(key: jax.Array, settings: Any) -> jax.Array:
+def _step(key: jax.Array, settings: ProgramConfig) -> jax.Array:
     """Draw a Gaussian change [], as often fine as coarse: the sensitivity is unknown."""
     key_fine, key_by = jax.random.split(key)
     low, high = settings.constants

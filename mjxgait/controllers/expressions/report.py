@@ -22,20 +22,20 @@ class ProgramView(GenomeView):
     """Expressions by joint; see `GenomeView`."""
 
     @override
-    def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
+    def facts(self, snapshot: Snapshot, i: int) -> dict[str, object]:
         return {
             "expressions": _texts(snapshot, i),
             "nodes": _nodes(snapshot)[i].tolist(),
             "nodes_that_matter": _mattering(snapshot, i),
         }
 
-    def spread(self, snapshot: Snapshot) -> dict[str, Any]:
+    def spread(self, snapshot: Snapshot) -> dict[str, object]:
         """See `GenomeView`: nodes per expression, over the population."""
         nodes = _nodes(snapshot)
         return {"nodes": {"mean": nodes.mean(0).tolist(), "most": nodes.max(0).tolist()}}
 
     @override
-    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
+    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, object]:
         mine, other = _texts(a, 0), _texts(b, 0)
         comparable = a.creature.joints.names == b.creature.joints.names
         alike = a.genomes["code"].shape[1:] == b.genomes["code"].shape[1:]

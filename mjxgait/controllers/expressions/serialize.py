@@ -29,12 +29,12 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 
 
-class ExpressionSerializer(PlainSerializer):
+class ExpressionSerializer(PlainSerializer[ProgramConfig]):
     """Serializer for genomes with `code` and `value` [J, C]; see `Serializer`."""
 
     def document(
         self, genome: Mapping[str, np.ndarray], settings: ProgramConfig, creature: Creature
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         """See `Serializer`. expressions: by joint. nodes: most per expression."""
         known = terminals(creature, tuple(ADDED.values()))
         rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
@@ -72,7 +72,7 @@ class ExpressionSerializer(PlainSerializer):
         return {"code": code, "value": value}
 
     @override
-    def settings(self, table: Mapping[str, Any], where: str) -> ProgramConfig:
+    def settings(self, table: Mapping[str, object], where: str) -> ProgramConfig:
         return build(ProgramConfig, table, where)
 
     @override

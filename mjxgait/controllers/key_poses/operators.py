@@ -1,13 +1,13 @@
 """Genetic operators for key poses [K, J] and tuning [E], each within its box."""
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.config.traced import chosen
+from mjxgait.config.traced import Choice, chosen
 from mjxgait.evolution.variation import (
     Box,
     Variation,
@@ -16,8 +16,11 @@ from mjxgait.evolution.variation import (
     narrowed,
 )
 
+if TYPE_CHECKING:
+    from mjxgait.controllers.key_poses.controller import Genome
 
-def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
+
+def pose_variation(box: Box, config: EvolutionConfig) -> "Variation[Genome]":
     """Return the operators that the config, plain or traced, selects.
 
     All options are computed and one is taken: their cost is negligible beside the simulations.
@@ -31,7 +34,7 @@ def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
     )
     middle = narrowed(box, config.initial_spread)
 
-    def cross(key: jax.Array, mother: Any, father: Any) -> Any:
+    def cross(key: jax.Array, mother: "Genome", father: "Genome") -> "Genome":
         key_poses, key_tuning = jax.random.split(key)
         permuted, aligned = (
             f(key_poses, mother.key_poses, father.key_poses)
@@ -47,7 +50,7 @@ def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
             tuning=jnp.where(from_mother, mother.tuning, father.tuning),
         )
 
-    def mutate(key: jax.Array, genome: Any) -> Any:
+    def mutate(key: jax.Array, genome: "Genome") -> "Genome":
         key_poses, key_tuning = jax.random.split(key)
         low, high = box.low, box.high
         poses = mutated_poses(
@@ -88,7 +91,7 @@ def mutated_poses(
     poses: jax.Array,
     low: jax.Array,
     high: jax.Array,
-    kind: Any,
+    kind: str | Choice,
     sigma: jax.Array | float,
     redrawn: jax.Array | float = 0.5,
 ) -> jax.Array:

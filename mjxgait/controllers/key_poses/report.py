@@ -17,7 +17,7 @@ class PoseView(GenomeView):
     """Key poses by joint, tuning by name; see `GenomeView`."""
 
     @override
-    def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
+    def facts(self, snapshot: Snapshot, i: int) -> dict[str, object]:
         creature, genomes = snapshot.creature, snapshot.genomes
         ranges = zip(
             creature.joints.names, creature.joints.pose_low, creature.joints.pose_high, strict=True
@@ -32,7 +32,7 @@ class PoseView(GenomeView):
             },
         }
 
-    def spread(self, snapshot: Snapshot) -> dict[str, Any]:
+    def spread(self, snapshot: Snapshot) -> dict[str, object]:
         """See `GenomeView`: the mean over the key poses, per joint."""
         poses, tuning = snapshot.genomes["key_poses"], snapshot.genomes["tuning"]
         spread = np.degrees(poses.std(axis=0).mean(axis=0))
@@ -43,7 +43,7 @@ class PoseView(GenomeView):
             "tuning_spread": _by_gene(snapshot, tuning.std(axis=0)),
         }
 
-    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
+    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, object]:
         """See `GenomeView`: key poses are compared only if the joints are the same."""
         mine, other = a.genomes, b.genomes
         comparable = (

@@ -18,12 +18,12 @@ LATER = {"begin": 0.0, "turn": 0.0}
 """Genes added later, with the values that reproduce older files."""
 
 
-class PoseSerializer(PlainSerializer):
+class PoseSerializer(PlainSerializer[PoseConfig]):
     """Serializer for `key_poses` [K, J] in rad and `tuning` [E] in the order of `gene_names`."""
 
     def document(
         self, genome: Mapping[str, np.ndarray], settings: PoseConfig, creature: Creature
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         """See `Serializer`. mirrored: whether the cycle includes the mirror images of the poses."""
         names = gene_names(creature.corrections.steps)
         return {
@@ -45,7 +45,7 @@ class PoseSerializer(PlainSerializer):
         return {"key_poses": np.array(poses, float), "tuning": np.array(tuning, float)}
 
     @override
-    def settings(self, table: Mapping[str, Any], where: str) -> PoseConfig:
+    def settings(self, table: Mapping[str, object], where: str) -> PoseConfig:
         return build(PoseConfig, table, where)
 
     @override

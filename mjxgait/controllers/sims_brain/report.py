@@ -17,16 +17,16 @@ COLUMNS = ("part", "node", "on part", "joint", "size (cm)", "swing (deg)", "stre
 class GraphView(GenomeView):
     """Grown parts; see `GenomeView`."""
 
-    def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
+    def facts(self, snapshot: Snapshot, i: int) -> dict[str, object]:
         """See `GenomeView`. size: m. swing: deg to either side. strength: N·m."""
         return {"parts": [_part(part) for part in _grown(snapshot, i)]}
 
-    def spread(self, snapshot: Snapshot) -> dict[str, Any]:
+    def spread(self, snapshot: Snapshot) -> dict[str, object]:
         """See `GenomeView`: the number of parts, over the population."""
         counts = [len(_grown(snapshot, i)) for i in range(len(snapshot.genomes["graph.half"]))]
         return {"parts": {"mean": float(np.mean(counts)), "most": max(counts)}}
 
-    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
+    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, object]:
         """See `GenomeView`: both champions' parts."""
         alike = all(
             name in b.genomes and array.shape[1:] == b.genomes[name].shape[1:]
@@ -65,7 +65,7 @@ def _grown(snapshot: Snapshot, i: int) -> list[Part]:
     return grow(genome, settings.parts, settings.links)
 
 
-def _part(part: Part) -> dict[str, Any]:
+def _part(part: Part) -> dict[str, object]:
     return {
         "node": part.node,
         "parent": part.parent,

@@ -17,7 +17,7 @@ from mjxgait.errors import UserError
 from mjxgait.kinds import in_water
 
 
-class GraphSerializer(Serializer):
+class GraphSerializer(Serializer[BrainConfig]):
     """See `Serializer`: arrays as nested lists under their names."""
 
     def settled(
@@ -32,7 +32,7 @@ class GraphSerializer(Serializer):
     @override
     def document(
         self, genome: Mapping[str, np.ndarray], settings: BrainConfig, creature: Creature
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         return {name: np.asarray(array).tolist() for name, array in genome.items()}
 
     @override
@@ -40,7 +40,7 @@ class GraphSerializer(Serializer):
         return {name: np.array(values) for name, values in document.items()}
 
     @override
-    def settings(self, table: Mapping[str, Any], where: str) -> BrainConfig:
+    def settings(self, table: Mapping[str, object], where: str) -> BrainConfig:
         return build(BrainConfig, table, where)
 
     @override

@@ -202,7 +202,7 @@ class Moment:
 
 
 @dataclasses.dataclass(frozen=True)
-class TreePlant(Plant):
+class TreePlant(Plant[Moment]):
     """One MuJoCo step of modular bodies; `BodyState.parameters` holds each lane's own tree."""
 
     around: Surroundings

@@ -31,7 +31,7 @@ from mjxgait.physics.lane_major.footing import (
     Turned,
 )
 from mjxgait.physics.lane_major.kinematics import Motion, Pose
-from mjxgait.physics.lane_major.lanes import Pin, Scalar, add, turn
+from mjxgait.physics.lane_major.lanes import Column, Pin, Scalar, add, turn
 from mjxgait.physics.lane_major.parameters import Softness
 from mjxgait.physics.lane_major.structure import Structure, scalars
 from mjxgait.physics.lane_major.treematrix import Carriers, Rows, Sparsity
@@ -69,7 +69,7 @@ def contact_terms(
     # Regulariser of all edges (MJX `_efc_contact_pyramidal`): inverse mass along one, by friction.
     inverse = springs.inverse * (1 + mu * mu) * 2 * mu * mu / impratio
     normal, first, second = velocity
-    reference = (
+    reference: Any = (
         -damping * normal - stiffness * impedance * depth,
         -damping * first,
         -damping * second,
@@ -89,7 +89,7 @@ def limit_terms(
     return pin(sign), pin(reference), pin(_weight(impedance, depth, springs.inverse))
 
 
-def _weight(impedance: Any, depth: jax.Array, inverse: Number) -> jax.Array:
+def _weight(impedance: Number, depth: jax.Array, inverse: Number) -> jax.Array:
     return jnp.where(
         depth < 0, impedance / jnp.maximum(inverse * (1 - impedance), mujoco.mjMINVAL), 0.0
     )
@@ -250,7 +250,7 @@ def _placed(structure: Structure, places: Sequence[int], pose: Pose) -> tuple[ja
     return x, y, z, *(like * _component(pose.origin, i) for i in range(3)), like * radius
 
 
-def _component(vector: Any, i: int) -> Any:
+def _component(vector: Column, i: int) -> Scalar:
     return vector if isinstance(vector, float) else vector[i]
 
 

@@ -7,7 +7,6 @@ Vectors are arrays [3, L], or constants.
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +14,7 @@ import numpy as np
 
 from mjxgait.physics.derived import single, whole
 from mjxgait.physics.lane_major.lanes import (
+    Column,
     Pin,
     Scalar,
     Vector,
@@ -33,9 +33,12 @@ from mjxgait.physics.lane_major.lanes import (
 )
 from mjxgait.physics.lane_major.structure import Body, Joint, Structure, scalars
 from mjxgait.physics.lane_major.treematrix import BALL, FREE, HINGE, SLIDE
+from mjxgait.types import Number
 
 UNITS: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-IDENTITY: Any = tuple(np.eye(3, dtype=np.float32)[:, j : j + 1] for j in range(3))
+IDENTITY: tuple[np.ndarray, ...] = tuple(
+    np.eye(3, dtype=np.float32)[:, j : j + 1] for j in range(3)
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,15 +49,15 @@ class Pose:
     three axes.
     """
 
-    origin: Any
-    pos: Any
-    rot: Any
+    origin: Column
+    pos: Column
+    rot: tuple[Column, ...]
 
-    def point(self, local: Vector) -> Any:
+    def point(self, local: Vector) -> Column:
         """A point of the body, from the origin."""
         return add(self.pos, turn(self.rot, local))
 
-    def far_point(self, local: Vector) -> Any:
+    def far_point(self, local: Vector) -> Column:
         """A point of the body in the world."""
         return add(self.origin, self.point(local))
 
@@ -69,9 +72,9 @@ class Freedom:
     The other fields are zero.
     """
 
-    axis: Any = 0.0
-    anchor: Any = 0.0
-    slide: Any = 0.0
+    axis: Column = 0.0
+    anchor: Column = 0.0
+    slide: Column = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,7 +128,7 @@ def _placed(body: Body, parent: Pose) -> Pose:
     )
 
 
-def unit_quaternion(quat: Any) -> tuple[jax.Array, ...]:
+def unit_quaternion(quat: jax.Array | Sequence[jax.Array]) -> tuple[jax.Array, ...]:
     """Normalise a quaternion (w, x, y, z)."""
     norm = jnp.sqrt(quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3])
     return tuple(q / norm for q in quat)
@@ -213,7 +216,7 @@ def _looked_up(
     places = table([pose.pos for pose in poses], like)[body]
     axes = [table([pose.rot[j] for pose in poses], like)[body] for j in range(3)]
 
-    def turned(local: Any) -> jax.Array:
+    def turned(local: Number) -> jax.Array:
         x, y, z = (single(local[:, j, None]) for j in range(3))
         return axes[0] * x + axes[1] * y + axes[2] * z
 

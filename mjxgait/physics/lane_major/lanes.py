@@ -8,17 +8,19 @@ scalars make a `Vector`; `turn` and `plus` also serve vectors that are one array
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.experimental.xla_metadata import set_xla_metadata
 
-from mjxgait.types import Number
+from mjxgait.types import Number, Tree
+
+Result = TypeVar("Result")
 
 
-def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+def one_kernel(function: Callable[..., Result]) -> Callable[..., Result]:
     """Compile the function on CPU into a single kernel instead of one per fused operation.
 
     XLA's CPU runtime starts every kernel separately (70 ns or more each), and a physics step has
@@ -30,14 +32,14 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     @functools.wraps(function)
-    def unmarked(*args: Any) -> Any:
+    def unmarked(*args: object) -> Result:
         with set_xla_metadata(xla_cpu_small_call=None, inlineable=None):
             return function(*args)
 
     compiled = jax.jit(unmarked)
 
     @functools.wraps(function)
-    def marked(*args: Any) -> Any:
+    def marked(*args: object) -> Result:
         if jax.default_backend() != "cpu":
             return function(*args)
         with set_xla_metadata(xla_cpu_small_call="true", inlineable="false"):
@@ -47,12 +49,21 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 Scalar = Any
-"""float | jax.Array"""
+"""float | jax.Array; the folding of constants decides which."""
+Column = Any
+"""Vector as one array [3, L], or [3] if constant; zero as the number 0.0."""
 Vector = tuple[Scalar, Scalar, Scalar]
 Constants = tuple[float, float, float]
 Matrix = tuple[Constants, Constants, Constants]
 """Three columns."""
-Pin = Callable[[Any], Any]
+
+
+class Pin(Protocol):
+    """Function that makes XLA compute the values of a pytree once; see `pinned_by`."""
+
+    def __call__(self, tree: Tree, /) -> Tree:
+        """Return the same values."""
+        ...
 
 
 def constant(value: float) -> float:
@@ -69,7 +80,7 @@ def constants(values: np.ndarray) -> Any:
     return tuple(constants(v) for v in values) if np.ndim(values) else constant(float(values))
 
 
-def rotation(quat: Sequence[Any]) -> tuple[tuple[Any, Any, Any], ...]:
+def rotation(quat: Sequence[Scalar]) -> tuple[Vector, Vector, Vector]:
     """Columns of the rotation matrix of a unit quaternion (w, x, y, z)."""
     w, x, y, z = quat
     return (
@@ -105,7 +116,7 @@ def add(*terms: Scalar) -> Scalar:
     return total(counted) if counted else 0.0
 
 
-def total(terms: Sequence[Any]) -> Any:
+def total(terms: Sequence[Scalar]) -> Scalar:
     """Sum one or more terms in their order."""
     result = terms[0]
     for term in terms[1:]:
@@ -132,27 +143,27 @@ def cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-def plus(a: Sequence[Scalar], b: Sequence[Scalar]) -> Any:
+def plus(a: Sequence[Scalar], b: Sequence[Scalar]) -> tuple[Scalar, ...]:
     """Sum of vectors."""
     return tuple(add(x, y) for x, y in zip(a, b, strict=True))
 
 
-def minus(a: Sequence[Scalar], b: Sequence[Scalar]) -> Any:
+def minus(a: Sequence[Scalar], b: Sequence[Scalar]) -> tuple[Scalar, ...]:
     """Difference of vectors."""
     return tuple(sub(x, y) for x, y in zip(a, b, strict=True))
 
 
-def scale(s: Scalar, a: Sequence[Scalar]) -> Any:
+def scale(s: Scalar, a: Sequence[Scalar]) -> tuple[Scalar, ...]:
     """Vector times scalar."""
     return tuple(mul(s, x) for x in a)
 
 
-def turn(matrix: Sequence[Any], vector: Sequence[Scalar]) -> Any:
+def turn(matrix: Sequence[Column], vector: Sequence[Scalar]) -> Column:
     """Multiply a matrix and a vector; the matrix is three columns, each an array [3, L]."""
     return dot(matrix, vector)
 
 
-def turn_each(matrices: Sequence[Any], vectors: Number) -> Vector:
+def turn_each(matrices: Sequence[Number], vectors: Number) -> Vector:
     """Apply `turn` to n vectors [n, 3, L], each with its own three columns [n, 3, L].
 
     Components [n, L].
@@ -166,7 +177,7 @@ def axes(array: jax.Array) -> Vector:
     return array[:, 0], array[:, 1], array[:, 2]
 
 
-def parts(vector: Any) -> Vector:
+def parts(vector: Column) -> Vector:
     """Split an array [3, L], or zero, into components."""
     return (0.0, 0.0, 0.0) if isinstance(vector, float) else (vector[0], vector[1], vector[2])
 
@@ -224,7 +235,7 @@ def column(values: Sequence[Scalar], dtype: np.dtype) -> Number:
     return jnp.stack([jnp.broadcast_to(jnp.asarray(v, dtype), wide) for v in values])
 
 
-def table(vectors: Sequence[Any], like: jax.Array) -> Any:
+def table(vectors: Sequence[Column], like: jax.Array) -> Any:
     """Stack vectors [3, L], some of them constants ([3] or zero), as one array [n, 3, L].
 
     [n, 3, 1] in NumPy if all are constants.
@@ -233,7 +244,7 @@ def table(vectors: Sequence[Any], like: jax.Array) -> Any:
         return np.array([np.broadcast_to(v, 3) for v in vectors], like.dtype)[:, :, None]
     shape = (3, like.shape[-1])
 
-    def full(vector: Any) -> jax.Array:
+    def full(vector: Column) -> jax.Array:
         if isinstance(vector, jax.Array):
             return jnp.broadcast_to(vector, shape)
         return jnp.broadcast_to(np.reshape(np.broadcast_to(vector, 3), (3, 1)), shape)

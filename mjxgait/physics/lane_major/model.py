@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
@@ -41,7 +42,7 @@ def check_supported(model: mujoco.MjModel) -> list[tuple[int, int]]:
     return _contact_pairs(model)
 
 
-def _refuse(when: Any, reason: str, names: Sequence[str] = ()) -> None:
+def _refuse(when: ArrayLike, reason: str, names: Sequence[str] = ()) -> None:
     """Raise if `when` [n] holds anywhere, and list the names of the elements for which it holds."""
     if np.any(when):
         told = [name for name, guilty in zip(names, np.ravel(when), strict=False) if guilty]

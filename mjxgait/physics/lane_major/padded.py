@@ -7,9 +7,9 @@ them. It costs a little at every step, so only a program with the body as an inp
 
 import dataclasses
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mjxgait.physics.derived import Bars
 from mjxgait.physics.lane_major.parameters import Parameters, Watched
@@ -79,7 +79,7 @@ def _bars(topology: Topology, known: Bars) -> Bars:
         for count, step in ((len(topology.bar_body), BARS), (len(topology.first), PAIRS))
     )
 
-    def padded(values: Any, more: int, fill: float = 0.0) -> np.ndarray:
+    def padded(values: ArrayLike, more: int, fill: float = 0.0) -> np.ndarray:
         known = np.asarray(values, float)
         return np.concatenate([known, np.full((more, *known.shape[1:]), fill)])
 

@@ -31,6 +31,7 @@ from mjxgait.physics.lane_major.kinematics import (
     unit_quaternion,
 )
 from mjxgait.physics.lane_major.lanes import (
+    Column,
     add,
     column,
     cross,
@@ -275,7 +276,7 @@ def _sense(
     )
 
 
-def _look(geom: Geom, poses: Sequence[Pose]) -> tuple[Any, jax.Array]:
+def _look(geom: Geom, poses: Sequence[Pose]) -> tuple[Column, jax.Array]:
     """Centre of a geom and the height of its lowest point."""
     pose = WORLD if geom.body < 0 else poses[geom.body]
     pos = pose.far_point(geom.pos)
@@ -295,7 +296,7 @@ def _above(
     return clearance(ground, cores[:, 0], cores[:, 1], cores[:, 2], radius)
 
 
-def _core(geom: Geom, poses: Sequence[Pose]) -> Any:
+def _core(geom: Geom, poses: Sequence[Pose]) -> Column:
     """Lowest point [3, L] of a geom without its radius."""
     pose = WORLD if geom.body < 0 else poses[geom.body]
     axes = [turn(pose.rot, column) for column in geom.rot]

@@ -190,7 +190,7 @@ def _extents(
     return radius if has_radius else 0.0, kept(box, has_box), kept(ellipsoid, has_ellipsoid)
 
 
-def scalars(numbers: Any) -> Any:
+def scalars(numbers: Number) -> Any:
     """Convert numbers [..., 1 or L] to nested tuples of scalars, the last axis but L innermost."""
     if np.ndim(numbers) > 1:
         return tuple(scalars(numbers[n]) for n in range(numbers.shape[0]))

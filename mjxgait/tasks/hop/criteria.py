@@ -3,7 +3,6 @@
 import abc
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from typing_extensions import override
@@ -124,7 +123,7 @@ class HopCriteria(GoalCriteria):
         outside = away(goal, outcome.path[:, due], outcome.aside[:, due]) > wanted.near * goal
         return super().lost(outcome, starts, steps) | outside.any(1)
 
-    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """See `AcceptanceCriteria`: distance from the goal at the end, and time of the final arrival."""
         left = _left(whole)
         outside = np.flatnonzero(~(left <= self.wanted(config).near * whole.goal))
@@ -223,7 +222,7 @@ class LimboCriteria(HopCriteria):
         clear = at_least("least clearance (m)", least, room, room + ENOUGH)
         return (*super().basic(whole, config), Criterion(3, "clear of the bar", (clear,)))
 
-    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """See `AcceptanceCriteria`: as for hopping, and the least clearance."""
         told = super().report(whole, config)
         least = _least(whole)
@@ -294,7 +293,7 @@ class TravelCriteria(GoalCriteria):
         shakes = at_most("buzz of a joint / joint speed", buzz(whole), config.gait.buzz)
         return (*super().undisturbed(whole, halved, config), Criterion(7, "gait", (shakes,)))
 
-    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """See `AcceptanceCriteria`: distance travelled, and number of goals."""
         way, goal, goals = whole.trunk_pos[:, 0], np.array(whole.goal), 0
         for place in np.maximum.accumulate(way):

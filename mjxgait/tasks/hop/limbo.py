@@ -116,11 +116,11 @@ class Limbo(Hop):
         return dataclasses.replace(starts, raised=jnp.zeros(settings.starts))
 
     @override
-    def levels(self, settings: Any) -> jax.Array | int:
+    def levels(self, settings: LimboConfig) -> jax.Array | int:
         steps: jax.Array | int = settings.lowering
         return steps
 
-    def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
+    def harder(self, trials: Starts, settings: LimboConfig, level: jax.Array) -> Starts:
         """See `Task`: the bar comes down, so that hoppers learn to duck little by little."""
         left = 1.0 - ramped(settings.lowering, level)
         raised = jnp.full(trials.friction.shape, settings.higher * left)
@@ -135,7 +135,7 @@ class Limbo(Hop):
         return Aim(super().aim(trial), jnp.asarray(trial.raised))
 
     @override
-    def standards(self, settings: Any) -> Any:
+    def standards(self, settings: Any) -> Standards:
         height = jnp.asarray(settings.height, jnp.float32)
         return Standards(**vars(super().standards(settings)), height=height)
 
@@ -159,7 +159,7 @@ class Limbo(Hop):
         return dataclasses.replace(after, bar=deepest, raised=aim.raised, height=standards.height)
 
     @override
-    def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
+    def judge(self, tally: Any, settings: object) -> dict[str, jax.Array]:
         deep = jnp.maximum(tally.bar - tally.raised, 0.0)
         bar = jnp.minimum(deep / (DEEP * self.creature.frame.hip_height), 1.0)
         return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})

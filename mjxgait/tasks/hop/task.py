@@ -13,7 +13,7 @@ from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
 from mjxgait.tasks.base import touches
 from mjxgait.tasks.hop import stats as hop
-from mjxgait.tasks.hop.config import GOALS, NEAR, NOMINAL_GOAL, HopConfig, TravelConfig
+from mjxgait.tasks.hop.config import GOALS, NEAR, NOMINAL_GOAL, GoalConfig, HopConfig, TravelConfig
 from mjxgait.tasks.hop.stats import (
     GOAL,
     Standards,
@@ -49,14 +49,14 @@ class Hop(PlainTask):
         step: float,
         horizon: int,
         ends: Termination | Ends,
-        settings: Any = None,
+        settings: GoalConfig | None = None,
     ) -> None:
         super().__init__(body, step, horizon, ends)
-        self.settings = settings or self.Settings()
+        self.settings: Any = settings or self.Settings()
 
     @classmethod
     def told(
-        cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: Any
+        cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: GoalConfig
     ) -> "Hop":
         """Return the task with these settings, which decide the terms."""
         return cls(body, step, horizon, ends, settings)
@@ -85,7 +85,7 @@ class Hop(PlainTask):
         return jnp.asarray(trial.goal)
 
     @override
-    def standards(self, settings: Any) -> Any:
+    def standards(self, settings: GoalConfig) -> Standards:
         return Standards(jnp.round(settings.rest / self.step))
 
     @override
@@ -99,7 +99,7 @@ class Hop(PlainTask):
 
     @override
     def update(
-        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
+        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Standards, aim: jax.Array
     ) -> Tally:
         after = updated(self.creature, self.step, tally, sensed, aim)
         after = with_extras(after, sensed, torque, self.step, self.sub_goals)
@@ -153,7 +153,7 @@ class Travel(Hop):
         goal = jnp.asarray(trial.goal)
         return Aim(goal, goal)
 
-    def onward(self, aim: Any, sensed: Sensed) -> Any:
+    def onward(self, aim: Aim, sensed: Sensed) -> Aim:
         """See `Task`: a goal that is near, or passed, moves on."""
         left = hop.goal_distance(self.creature, aim.goal, sensed)
         reached = left <= NEAR * aim.spacing
@@ -169,13 +169,13 @@ class Travel(Hop):
 
     @override
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Standards, aim: Any
     ) -> Any:
         after: Any = super().update(tally, sensed, torque, standards, aim.goal)
         reached = jnp.round(aim.goal / aim.spacing).astype(jnp.int32) - 1
         return dataclasses.replace(after, reached=reached)
 
-    def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
+    def judge(self, tally: Tally, settings: object) -> dict[str, jax.Array]:
         """See `Task`: style counts in proportion to the share of the way to the nominal goal."""
         way = self._way(tally) / NOMINAL_GOAL
         style = style_terms(self.creature, self.horizon, tally)
@@ -191,8 +191,10 @@ class Travel(Hop):
         }
 
     @override
-    def weights(self, settings: Any, generation: jax.Array) -> dict[str, jax.Array]:
+    def weights(
+        self, settings: HopConfig | TravelConfig, generation: jax.Array
+    ) -> dict[str, jax.Array]:
         return signed_weights(settings, generation)
 
-    def _way(self, tally: Any) -> jax.Array:
+    def _way(self, tally: Tally) -> jax.Array:
         return jnp.where(tally.steps > 0, tally.goal - tally.left, 0.0)

@@ -5,7 +5,6 @@ Letters: `T` frames, `P` spans of time.
 
 import abc
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from typing_extensions import override
@@ -137,7 +136,7 @@ class ModularCriteria(StaysUp, abc.ABC):
         share = at_least(f"share that {self.verb}", started, self.wanted(config).arrive, 1.0)
         return (Criterion(4, "perturbed starts", (share,)),)
 
-    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """See `AcceptanceCriteria`: the performance, and the body."""
         window = whole.window(config.warmup)
         done, parts, unit = self.done(window), len(seen(whole).sizes), UNITS[self.promised]

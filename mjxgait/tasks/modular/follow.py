@@ -58,7 +58,7 @@ class Following(GoingTask):
 
     @override
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
+        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: jax.Array
     ) -> Any:
         after = super().update(tally, sensed, torque, standards, aim)
         return dataclasses.replace(after, light=aim, since=standards)

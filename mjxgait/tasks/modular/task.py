@@ -78,7 +78,7 @@ class BlocksTask(PlainTask):
         return jnp.round(settings.settle / self.step).astype(jnp.int32)
 
     @override
-    def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
+    def ended(self, sensed: Sensed, aim: object) -> jax.Array:
         speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
         wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
         assert sensed.past is not None
@@ -106,7 +106,7 @@ class GoingTask(BlocksTask):
     axes: ClassVar[int] = 3
     dark: ClassVar[np.ndarray | None] = None
 
-    def way(self, tally: Any) -> jax.Array:
+    def way(self, tally: Tally) -> jax.Array:
         """Straight-line distance [] in m from where counting began."""
         return length((tally.place - tally.settled)[: self.axes])
 
@@ -124,7 +124,7 @@ class GoingTask(BlocksTask):
         }
 
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
     ) -> Any:
         """See `Task`: the place now, and when counting began."""
         assert sensed.middle is not None
@@ -135,11 +135,11 @@ class GoingTask(BlocksTask):
             place=sensed.middle,
         )
 
-    def speed(self, tally: Any, settings: BlocksConfig) -> jax.Array:
+    def speed(self, tally: Tally, settings: BlocksConfig) -> jax.Array:
         """Speed [] in m/s over the time that counts, even if the episode ended early."""
         return self.way(tally) / jnp.maximum(self.horizon * self.step - settings.settle, self.step)
 
-    def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
+    def outcome(self, tally: Tally) -> Mapping[str, jax.Array]:
         """See `Task`: m from where counting began, and s until the end."""
         return {"way": self.way(tally), "seconds": tally.steps * self.step}
 
@@ -188,7 +188,7 @@ class Swim(GoingTask):
 
     @override
     def update(
-        self, tally: SwimTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+        self, tally: SwimTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
     ) -> SwimTally:
         assert sensed.momentum is not None
         assert sensed.washed is not None
@@ -245,7 +245,7 @@ class Roam(GoingTask):
 
     @override
     def update(
-        self, tally: RoamTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+        self, tally: RoamTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
     ) -> RoamTally:
         assert sensed.sunk is not None
         begins = tally.steps <= standards
@@ -308,7 +308,7 @@ class Jump(BlocksTask):
 
     @override
     def update(
-        self, tally: JumpTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+        self, tally: JumpTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: object
     ) -> JumpTally:
         assert sensed.sunk is not None
         begins, low = tally.steps <= standards, jnp.min(sensed.geom_low)

@@ -1,7 +1,6 @@
 """Acceptance criteria of `turn`, in NumPy."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from typing_extensions import override
@@ -56,7 +55,7 @@ class TurnCriteria(PlainCriteria):
         )
 
     @override
-    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         window = whole.window(config.warmup)
         turned = np.degrees(np.ptp(_heading(window)))
         rate = turned / (len(window.trunk_pos) * window.time_step)

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -67,7 +67,7 @@ class Turn(PlainTask):
 
     @override
     def update(
-        self, tally: TurnTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+        self, tally: TurnTally, sensed: Sensed, torque: jax.Array, standards: object, aim: object
     ) -> TurnTally:
         place = sensed.trunk_pos[:2]
         start = jnp.where(tally.steps == 0, place, tally.start)

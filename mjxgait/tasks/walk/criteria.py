@@ -5,7 +5,6 @@ Letters: `T` frames, `N` feet.
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from typing_extensions import override
@@ -51,6 +50,7 @@ from mjxgait.reference.measure import (
 from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.tasks.walk.gaits import gait_of, transition
 from mjxgait.tasks.walk.target_criteria import (
+    Wish,
     as_asked,
     draw_commands,
     following,
@@ -79,11 +79,11 @@ class WalkCriteria(StaysUp):
     revision = 1
     """Criteria for flicker, buzz, tilt, heading and limping were added."""
 
-    def __init__(self, wish: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, wish: Wish | None = None) -> None:
         self.wish = dict(wish or {})
 
     @override
-    def asked(self, wish: Mapping[str, Any]) -> "WalkCriteria":
+    def asked(self, wish: Wish) -> "WalkCriteria":
         return WalkCriteria(wish) if wish else self
 
     @override
@@ -121,7 +121,7 @@ class WalkCriteria(StaysUp):
             *wishes,
         )
 
-    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """See `AcceptanceCriteria`."""
         whole = unrolled(whole, self.wish)
         window = whole.window(config.warmup)
@@ -242,12 +242,12 @@ def half_step(whole: Recording, halved: Recording, config: CertificateConfig) ->
     )
 
 
-def gait(window: Recording, config: GaitConfig, wish: Mapping[str, Any] | None = None) -> Criterion:
+def gait(window: Recording, config: GaitConfig, wish: Wish | None = None) -> Criterion:
     """7. A gait, not a vibration: slow, long strides; feet lift and do not slide; sides alike."""
     return Criterion(7, "gait", (*_strides(window, config), *_manner(window, config, wish or {})))
 
 
-def _manner(window: Recording, config: GaitConfig, wish: Mapping[str, Any]) -> tuple[Measure, ...]:
+def _manner(window: Recording, config: GaitConfig, wish: Wish) -> tuple[Measure, ...]:
     """Measures of criterion 7 that detect vibration and a limp."""
     measures = (
         at_most("flicker of a foot per stride", patter(window), config.flicker),
@@ -262,7 +262,7 @@ def _manner(window: Recording, config: GaitConfig, wish: Mapping[str, Any]) -> t
     )
 
 
-def two_like_sides(wish: Mapping[str, Any], size: Dimensions) -> bool:
+def two_like_sides(wish: Wish, size: Dimensions) -> bool:
     """Return whether left and right should move alike.
 
     They need not on a circle, nor in a target gait that leads with one side.

@@ -6,7 +6,6 @@ that earn the same, the one with the smaller sum of penalties is better, whateve
 """
 
 import dataclasses
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -266,7 +265,7 @@ def likeness(creature: Body, step: float, horizon: int, tally: WishTally) -> dic
     }
 
 
-def steady_speed(step: float, horizon: int, tally: Any) -> jax.Array:
+def steady_speed(step: float, horizon: int, tally: Tally) -> jax.Array:
     """Speed [] in m/s over the second half of the episode, or over all of a shorter one."""
     half = horizon // 2
     late = tally.steps > half
@@ -274,7 +273,7 @@ def steady_speed(step: float, horizon: int, tally: Any) -> jax.Array:
     return way / (jnp.maximum(jnp.where(late, tally.steps - half, tally.steps), 1) * step)
 
 
-def wish_weights(wish: WishConfig) -> dict[str, Any]:
+def wish_weights(wish: WishConfig) -> dict[str, float]:
     """Weights of the targets that are set and have a term of their own."""
     return {n: getattr(wish.weights, n) for n in wish.asked if hasattr(wish.weights, n)}
 

@@ -59,7 +59,7 @@ def stride_limit(mass: float) -> float:
     return 1.2 * 4.48 * mass**-0.14
 
 
-def animal_stride(speed: Any, hip_height: Any) -> Any:
+def animal_stride(speed: Any, hip_height: float) -> Any:
     """Stride length in m of an animal at a speed in m/s, for numbers or arrays.
 
     2.3 (v²/gh)^0.3 hip heights (Alexander 1976).
@@ -67,7 +67,7 @@ def animal_stride(speed: Any, hip_height: Any) -> Any:
     return 2.3 * (speed**2 / (GRAVITY * hip_height)) ** 0.3 * hip_height
 
 
-def animal_duty(speed: Any, hip_height: Any) -> Any:
+def animal_duty(speed: Any, hip_height: float) -> Any:
     """Duty factor of an animal at a speed in m/s, for numbers or arrays.
 
     0.52 (v²/gh)^-0.14 (Alexander & Jayes 1983, running mammals), 0.9 at most.
@@ -76,7 +76,7 @@ def animal_duty(speed: Any, hip_height: Any) -> Any:
     return 0.52 * (froude**2 + SLOWEST**2) ** -0.07
 
 
-def most_strides(speed: Any, hip_height: Any) -> Any:
+def most_strides(speed: Any, hip_height: float) -> Any:
     """Stride frequency in Hz of the shortest allowed strides at a speed in m/s."""
     return speed / (SHORTEST * animal_stride(speed, hip_height))
 

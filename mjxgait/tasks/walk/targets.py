@@ -54,7 +54,7 @@ class Wishes:
     certificate: str | None = None
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> "Wishes":
+    def of(cls, given: Mapping[str, object]) -> "Wishes":
         """Build the targets from the options that were given, as text or as values.
 
         Raises:
@@ -116,7 +116,7 @@ def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
         config = _styled(config, wishes.style)
     if wishes.certificate is not None:
         config = _demanded(config, wishes.certificate)
-    table: dict[str, Any] = {}
+    table: dict[str, object] = {}
     for layer in (
         _pace(wishes, creature, config),
         _turn("turn", wishes.turn),
@@ -165,7 +165,7 @@ def speed_of(text: str, creature: Creature) -> float:
     return value * creature.frame.body_length if plain.endswith("bl/s") else value
 
 
-def _pace(wishes: Wishes, creature: Creature, config: Config) -> dict[str, Any]:
+def _pace(wishes: Wishes, creature: Creature, config: Config) -> dict[str, object]:
     """Settings for speed and gait, and for a textbook cycle near which evolution begins."""
     asked, name = wishes.speed, wishes.gait or AUTO
     if asked is None and name == AUTO:
@@ -179,7 +179,7 @@ def _pace(wishes: Wishes, creature: Creature, config: Config) -> dict[str, Any]:
     return merge(merge(wish, {"evolution": ORDERED}), begins)
 
 
-def _speed(speed: float, creature: Creature) -> dict[str, Any]:
+def _speed(speed: float, creature: Creature) -> dict[str, object]:
     """Settings for a speed in m/s, with a cycle no shorter than the shortest stride at that speed.
 
     Ten steps from pose to pose, a fifth of a second for all four, let a gait of small movements
@@ -190,25 +190,25 @@ def _speed(speed: float, creature: Creature) -> dict[str, Any]:
     return {"fitness": {"wish": {"speed": speed}}, "controller": {"interpolation": steps}}
 
 
-def _natural(name: str) -> dict[str, Any]:
+def _natural(name: str) -> dict[str, object]:
     """Settings for an animal's footfalls, strides and duty factor, level, feet below the hips."""
     like = {"gait": name, "stride": 1.0, "duty_factor": 1.0, "reach": 0.0, "pitch": 0.0}
     return {"fitness": {"wish": like}}
 
 
-def _named(name: str, creature: Creature) -> dict[str, Any]:
+def _named(name: str, creature: Creature) -> dict[str, object]:
     if name == AUTO:
         return {}
     try:
         gait = gait_of(name, len(creature.feet.names))
     except ValueError as error:
         raise UserError(f"--gait {name}: {creature.name}: {error}, and {NATURAL}") from None
-    whole: dict[str, Any] = {"mirror": False, "key_poses": 4}
+    whole: dict[str, object] = {"mirror": False, "key_poses": 4}
     wish = {"gait": name} | ({} if gait.sway is None else {"sway": gait.sway})
     return {"fitness": {"wish": wish}} | ({} if gait.twice else {"controller": whole})
 
 
-def _turn(name: str, rate: float | None) -> dict[str, Any]:
+def _turn(name: str, rate: float | None) -> dict[str, object]:
     if rate is None:
         return {}
     controller = {"tuning": {"steer": [0.0, 6.0]}, "steering": 3.0}

@@ -35,6 +35,8 @@ from mjxgait.tasks.walk.stats import (
 )
 from mjxgait.types import Sensed
 
+Heading = tuple[()] | tuple[jax.Array, jax.Array]
+"""Commanded heading [] in rad and its change per step; empty without a command."""
 FALLEN = 0.2
 """Largest share of falls at which an individual is ready for harder trials."""
 
@@ -96,13 +98,13 @@ class Walk(PlainTask):
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
     @override
-    def init(self) -> Any:
+    def init(self) -> Tally:
         return self._keeper.init()
 
     @override
     def update(
         self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
-    ) -> Any:
+    ) -> Tally:
         return self._keeper.update(tally, sensed, torque, standards)
 
     @override
@@ -156,17 +158,17 @@ class AskedWalk(Walk):
             return starts
         return dataclasses.replace(starts, turn=jnp.radians(rate))
 
-    def aim(self, trial: Starts) -> Any:
+    def aim(self, trial: Starts) -> Heading:
         """See `Task`: the commanded heading [] in rad, and its change per step."""
         if trial.turn is None:
             return ()
         return jnp.zeros(()), trial.turn * self.step
 
     @override
-    def onward(self, aim: Any, sensed: Sensed) -> Any:
+    def onward(self, aim: Heading, sensed: Sensed) -> Heading:
         return (aim[0] + aim[1], aim[1]) if aim else aim
 
-    def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
+    def senses(self, aim: Heading, sensed: Sensed) -> dict[str, jax.Array]:
         """See `Task`: with a commanded heading there is no line to return to."""
         if not aim:
             return {}
@@ -179,7 +181,12 @@ class AskedWalk(Walk):
 
     @override
     def update(
-        self, tally: WishTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+        self,
+        tally: WishTally,
+        sensed: Sensed,
+        torque: jax.Array,
+        standards: jax.Array,
+        aim: Heading,
     ) -> WishTally:
         plain = self._keeper.update(tally, sensed, torque, standards)
         after = wish_updated(self.creature, tally, plain, sensed)

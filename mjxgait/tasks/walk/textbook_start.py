@@ -1,7 +1,5 @@
 """Settings that start evolution near a textbook cycle, drawn after an animal's."""
 
-from typing import Any
-
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.creature.textbook import Footfalls, textbook_cycle
@@ -49,7 +47,7 @@ def natural_gait(creature: Creature, speed: float) -> str:
     return names.get(len(creature.feet.names), AUTO)
 
 
-def drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[str, Any]:
+def drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[str, object]:
     """Settings for a textbook cycle of a gait at a speed in m/s.
 
     The cycle has an animal's strides and duty factor. Empty if the gait has no name, or no second
