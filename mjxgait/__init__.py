@@ -17,7 +17,7 @@ Give it a body and it returns a walk that holds up in physics, tested in a secon
 On the command line: `mjxgait --help`.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from mjxgait.api import (
@@ -34,7 +34,7 @@ __version__ = "0.1.0"
 __all__ = ["Run", "examine", "load_creature", "open", "refine", "train", "walk"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Import a public name on first use: the command line must not wait for it."""
     if name in __all__:
         from mjxgait import api as library

@@ -89,7 +89,7 @@ def read_lines(path: Path, most: int = MOST_LINES) -> list[dict[str, Any]]:
     return found
 
 
-def check_tree(value: Any) -> None:
+def check_tree(value: object) -> None:
     """Refuse nested tables and lists that this program never writes.
 
     Raises:
@@ -97,7 +97,7 @@ def check_tree(value: Any) -> None:
     """
     level = [value]
     for _ in range(MOST_DEPTH):
-        inner: list[Any] = []
+        inner: list[object] = []
         for one in level:
             match one:
                 case dict():

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from mjxgait.certification import Certificate, CertificateConfig, certify
 from mjxgait.certification.validity import differences
 from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Config
-from mjxgait.config.tables import build, merge, read_toml
+from mjxgait.config.tables import Table, build, merge, read_toml
 from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
 from mjxgait.creature.scale import at_step, facing, load_files, scaled
@@ -69,7 +68,7 @@ def train(
     seed: int = 0,
     population: int | None = None,
     generations: int | None = None,
-    settings: Mapping[str, Any] | None = None,
+    settings: Table | None = None,
     quiet: bool = False,
 ) -> Run:
     """Evolve a creature, examine its champion, and return the run.
@@ -138,7 +137,7 @@ def refine(
     seed: int = 0,
     population: int | None = None,
     generations: int | None = None,
-    settings: Mapping[str, Any] | None = None,
+    settings: Table | None = None,
     quiet: bool = False,
 ) -> Run:
     """Evolve a walk near a hand-made or captured cycle, and return the run (docs/guide/refine.md).

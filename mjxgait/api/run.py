@@ -2,11 +2,12 @@
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mjxgait.certification import judged, outdated, read_certificate
+from mjxgait.certification.verdict import Document
 from mjxgait.champion import Champion
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
@@ -53,7 +54,7 @@ class Run:
         return open_champion(self.folder)[1]
 
     @property
-    def certificate(self) -> dict[str, Any] | None:
+    def certificate(self) -> Document | None:
         """Contents of `certificate.json`; None before an examination."""
         return read_certificate(self.folder / CERTIFICATE)
 

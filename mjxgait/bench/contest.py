@@ -9,7 +9,7 @@ import importlib.util
 import json
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -38,6 +38,10 @@ LABELS = {
 PACKAGES = ("mjxgait", "jax", "jaxlib", "mujoco", "mujoco-mjx", "numpy", "dartpy")
 
 
+Result = dict[str, Any]
+"""Results of one creature, as in the JSON file."""
+
+
 class Contestant(Protocol):
     """Anything that can run a workload once."""
 
@@ -48,7 +52,7 @@ class Contestant(Protocol):
 
 def contest(
     folder: Path, config: Config, rounds: int, generations: int, say: Callable[[str], None]
-) -> dict[str, Any]:
+) -> Result:
     """Return all results of the benchmark, ready for JSON.
 
     Args:
@@ -100,7 +104,7 @@ def contest(
     }
 
 
-def append_history(result: dict[str, Any], file: Path) -> None:
+def append_history(result: Result, file: Path) -> None:
     """Append a line with the figures that would show a regression."""
     kept = (
         "date",
@@ -164,7 +168,7 @@ def _interleave(
     return laps
 
 
-def ratio_table(results: list[dict[str, Any]]) -> str:
+def ratio_table(results: Sequence[Result]) -> str:
     """Make a line per creature: us of processor time per useful step, and its ratio to ours."""
     names = [name for name in LABELS if any(name in r["laps"] for r in results)]
     lines = [f"{'us per useful step':18}" + "".join(f"{LABELS[name]:>18}" for name in names)]
@@ -179,13 +183,13 @@ def ratio_table(results: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def _ratios(laps: dict[str, list[Lap]]) -> dict[str, Any]:
+def _ratios(laps: dict[str, list[Lap]]) -> dict[str, object]:
     """Return our speed over each contestant's within a round: medians, None if left out.
 
     ratio_over_NAME: by wall time, ratio_spread: its quartiles. processor_ratio: by processor time,
     which other work on the machine changes less.
     """
-    result: dict[str, Any] = {f"ratio_over_{name}": None for name in ("c", "mujoco_c", "dart")}
+    result: dict[str, object] = {f"ratio_over_{name}": None for name in ("c", "mujoco_c", "dart")}
     spread, processor = {}, {}
     for name in (name for name in laps if name != "ours"):
         rounds = list(zip(laps["ours"], laps[name], strict=True))
@@ -206,7 +210,7 @@ def _spread(values: list[float]) -> dict[str, float]:
     }
 
 
-def _described(work: Workload, ours: Ours, rounds: int, generations: int) -> dict[str, Any]:
+def _described(work: Workload, ours: Ours, rounds: int, generations: int) -> dict[str, object]:
     option = ours.experiment.creature.evolution_model.opt
     return {
         "creature": ours.experiment.creature.name,

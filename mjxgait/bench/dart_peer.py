@@ -6,8 +6,6 @@ end. It steps one world at a time; the controller is vectorised over `LANES` wor
 dartpy's accessors allow.
 """
 
-from typing import Any
-
 import dartpy  # type: ignore[import-not-found,unused-ignore]
 import mujoco
 import numpy as np
@@ -182,10 +180,12 @@ class _Lane:
         return False
 
 
-def _skeleton(creature: Creature, model: mujoco.MjModel) -> tuple[Any, dict[int, Any]]:
+def _skeleton(
+    creature: Creature, model: mujoco.MjModel
+) -> "tuple[dartpy.dynamics.Skeleton, dict[int, dartpy.dynamics.BodyNode]]":
     """Build the body; also return its DART nodes by MuJoCo's body ids."""
     skeleton = dartpy.dynamics.Skeleton("creature")
-    nodes: dict[int, Any] = {}
+    nodes: dict[int, dartpy.dynamics.BodyNode] = {}
     for body in range(1, model.nbody):
         node = _node(skeleton, model, body, nodes.get(int(model.body_parentid[body])))
         frame = _rotation(model.body_iquat[body])
@@ -199,7 +199,12 @@ def _skeleton(creature: Creature, model: mujoco.MjModel) -> tuple[Any, dict[int,
     return skeleton, nodes
 
 
-def _node(skeleton: Any, model: mujoco.MjModel, body: int, parent: Any) -> Any:
+def _node(
+    skeleton: "dartpy.dynamics.Skeleton",
+    model: mujoco.MjModel,
+    body: int,
+    parent: "dartpy.dynamics.BodyNode | None",
+) -> "dartpy.dynamics.BodyNode":
     """Add a body and its joint: free, one hinge, or two crossing hinges as a universal joint."""
     dynamics = dartpy.dynamics
     joints = range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body])
@@ -232,7 +237,7 @@ def _node(skeleton: Any, model: mujoco.MjModel, body: int, parent: Any) -> Any:
     return create(parent, properties)[1]
 
 
-def _sphere(node: Any, model: mujoco.MjModel, geom: int) -> None:
+def _sphere(node: "dartpy.dynamics.BodyNode", model: mujoco.MjModel, geom: int) -> None:
     if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_SPHERE:
         raise Unsupported("the DART peer knows spheres as feet only")
     shape = node.createShapeNode(dartpy.dynamics.SphereShape(float(model.geom_size[geom, 0])))
@@ -242,7 +247,7 @@ def _sphere(node: Any, model: mujoco.MjModel, geom: int) -> None:
     shape.createDynamicsAspect().setFrictionCoeff(10.0)
 
 
-def _floor() -> Any:
+def _floor() -> "dartpy.dynamics.Skeleton":
     """Return a box whose top is the floor."""
     floor = dartpy.dynamics.Skeleton("floor")
     _, node = floor.createWeldJointAndBodyNodePair()

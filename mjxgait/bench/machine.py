@@ -8,10 +8,10 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -21,10 +21,13 @@ from mjxgait.processes import cores, process_per_core
 from mjxgait.simulation.rollout import Lane
 from mjxgait.training.experiment import Experiment
 
+if TYPE_CHECKING:
+    from jax.extend.core import Jaxpr
+
 TRIES = 20
 
 
-def machine_facts() -> dict[str, Any]:
+def machine_facts() -> dict[str, object]:
     """Return processor, cores, system, and the load before the measurement."""
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     return {
@@ -102,7 +105,7 @@ REDUCTIONS = frozenset(
 )
 
 
-def count_flops(function: Callable[..., Any], *args: Any) -> float:
+def count_flops(function: Callable[..., object], *args: object) -> float:
     """Count the floating-point operations of a function, comparisons and choices included.
 
     A loop counts as often as it runs, if that is known.
@@ -110,7 +113,7 @@ def count_flops(function: Callable[..., Any], *args: Any) -> float:
     return _count(jax.make_jaxpr(function)(*args).jaxpr)
 
 
-def _count(jaxpr: Any) -> float:
+def _count(jaxpr: "Jaxpr") -> float:
     return sum(_equation(equation) for equation in jaxpr.eqns)
 
 
@@ -132,11 +135,11 @@ def _equation(equation: Any) -> float:
     return float(equation.outvars[0].aval.size) if name in ONE_EACH else 0.0
 
 
-def _inner(params: dict[str, Any]) -> Any:
+def _inner(params: Mapping[str, object]) -> "Iterator[Jaxpr]":
     """Yield the programs within an operation: loop bodies, branches, calls."""
     for value in params.values():
         for item in value if isinstance(value, (tuple, list)) else (value,):
-            jaxpr = getattr(item, "jaxpr", item)
+            jaxpr: Any = getattr(item, "jaxpr", item)
             if hasattr(jaxpr, "eqns"):
                 yield jaxpr
 
@@ -166,7 +169,7 @@ def step_cost(experiment: Experiment) -> dict[str, float]:
 
 def distance_to_limit(
     cost: dict[str, float], peak: dict[str, float], computed_rate: float
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the shares of the measured peaks that `computed_rate` creature-steps per second use.
 
     A share of 1 is the machine's limit.
@@ -183,7 +186,7 @@ def distance_to_limit(
     }
 
 
-def _lanes(experiment: Experiment, lanes: int, genomes: Any) -> Lane:
+def _lanes(experiment: Experiment, lanes: int, genomes: object) -> Lane:
     """Start as many simulations as a device holds, of the first of genomes [N, ...]."""
     simulator = experiment.simulator
     genomes = jax.tree.map(lambda leaf: leaf[None, :1], genomes)

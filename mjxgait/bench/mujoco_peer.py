@@ -6,8 +6,6 @@ episode at once, and is no longer stepped when no episode is left; only then are
 It records no statistics but the distance, so it does less than its rivals.
 """
 
-from typing import Any
-
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
@@ -20,6 +18,10 @@ from mjxgait.reference.layout import Layout, LowestPoint
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 LANES = 128
 """Simulations per core: with fewer NumPy's calls cost more, more do not fit the cache."""
+
+
+Rows = slice | np.ndarray
+"""Some of the simulations; a slice gives views of their arrays."""
 
 
 class MujocoPeer:
@@ -63,7 +65,7 @@ class MujocoPeer:
         self.moved = np.zeros(self.lanes)
         self.taken, total, forward = 0, 0, 0.0
         self._refill(np.arange(self.lanes))
-        rows: Any = slice(None)
+        rows: Rows = slice(None)
         while True:
             self._push(rows)
             ended = (self._down(rows) | (self.steps[rows] >= self.work.steps)).nonzero()[0]
@@ -81,7 +83,7 @@ class MujocoPeer:
                 continue
             self._step(rows)
 
-    def _step(self, rows: Any) -> None:
+    def _step(self, rows: Rows) -> None:
         """Run one control step of the simulations in `rows`."""
         creature, law, genome = self.creature, self.law, self.job[rows] // len(self.work.qpos)
         pos, rot = (
@@ -120,7 +122,7 @@ class MujocoPeer:
         self.batch.forward(rows, stage=VELOCITY_STAGE)
         return len(rows)
 
-    def _push(self, rows: Any) -> None:
+    def _push(self, rows: Rows) -> None:
         start = self.job[rows] % len(self.work.qpos)
         now = (self.steps[rows] == self.work.push_step[start]).nonzero()[0]
         if len(now):
@@ -128,7 +130,7 @@ class MujocoPeer:
             self.qvel[lanes] += self.work.push[start[now]]
             self.batch.forward(lanes, stage=VELOCITY_STAGE)
 
-    def _down(self, rows: Any) -> np.ndarray:
+    def _down(self, rows: Rows) -> np.ndarray:
         """Apply the rules of `mjxgait.tasks.walk.stats`.
 
         The comparisons are negated, so that NaN counts as down.
@@ -290,7 +292,7 @@ def _has_passive(model: mujoco.MjModel) -> bool:
     )
 
 
-def _span(adr: np.ndarray) -> Any:
+def _span(adr: np.ndarray) -> Rows:
     """Return consecutive addresses as a slice, which gives a view instead of a copy."""
     return (
         slice(int(adr[0]), int(adr[-1]) + 1)

@@ -143,7 +143,7 @@ def _operators(experiment: Experiment) -> float:
     task, count = experiment.simulator.task, experiment.config.evolution.offspring
     trials = experiment.config.rollout.starts
 
-    def stub(genomes: Any) -> Judged:
+    def stub(genomes: Genome) -> Judged:
         terms = jnp.mean(genomes.key_poses, axis=(1, 2))[:, None, None] * jnp.ones(
             (1, trials, len(task.terms))
         )
@@ -182,7 +182,7 @@ def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
     """Return seconds per generation of a run's own loop: in all, compiled part, checkpoints."""
     inside: list[float] = []
 
-    def step(state: EvolutionState) -> Any:
+    def step(state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
         began = time.perf_counter()
         result = jax.block_until_ready(ours.step(state))
         inside.append(time.perf_counter() - began)

@@ -11,7 +11,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.processes import python_command, safe_environment
@@ -37,7 +36,7 @@ class Point:
     laps: int = 3
 
 
-def scaling_points(creature: str, say: Callable[[str], None]) -> dict[str, list[dict[str, Any]]]:
+def scaling_points(creature: str, say: Callable[[str], None]) -> dict[str, list[dict[str, float]]]:
     """Measure all curves: over the population, over the lanes, and the default settings."""
     curves = {
         "population": [Point(population=p) for p in POPULATIONS],
@@ -47,7 +46,7 @@ def scaling_points(creature: str, say: Callable[[str], None]) -> dict[str, list[
             for p in DEFAULTS
         ],
     }
-    found: dict[str, list[dict[str, Any]]] = {name: [] for name in curves}
+    found: dict[str, list[dict[str, float]]] = {name: [] for name in curves}
     for name, points in curves.items():
         for point in points:
             found[name].append(measured := measure(creature, point))
@@ -55,7 +54,7 @@ def scaling_points(creature: str, say: Callable[[str], None]) -> dict[str, list[
     return found
 
 
-def _line(point: dict[str, Any]) -> str:
+def _line(point: dict[str, float]) -> str:
     return (
         f"population {point['population']:>5}, {point['lanes']:>3} lanes: "
         f"{point['useful_steps_per_second']:>9,.0f} useful steps/s, {point['useful_share']:.0%} "
@@ -63,7 +62,7 @@ def _line(point: dict[str, Any]) -> str:
     )
 
 
-def measure(creature: str, point: Point) -> dict[str, Any]:
+def measure(creature: str, point: Point) -> dict[str, float]:
     """Measure one point, in a new process."""
     arguments = [creature, json.dumps(dataclasses.asdict(point))]
     result = subprocess.run(
@@ -76,7 +75,7 @@ def measure(creature: str, point: Point) -> dict[str, Any]:
     return json.loads(result.stdout.splitlines()[-1])
 
 
-def measure_here(creature: str, point: Point) -> dict[str, Any]:
+def measure_here(creature: str, point: Point) -> dict[str, float]:
     """Measure one point in this process, by evaluating an initial population repeatedly.
 
     Memory is the peak in MiB.
@@ -110,7 +109,7 @@ def measure_here(creature: str, point: Point) -> dict[str, Any]:
     }
 
 
-def draw(points: dict[str, list[dict[str, Any]]], path: Path) -> None:
+def draw(points: dict[str, list[dict[str, float]]], path: Path) -> None:
     """Draw the two curves and the memory."""
     from matplotlib.figure import Figure
 

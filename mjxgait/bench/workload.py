@@ -6,7 +6,6 @@ as in MuJoCo.
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -130,7 +129,7 @@ def _keep_inertia(body: mujoco.MjsBody, full: mujoco.MjModel) -> None:
     body.ipos, body.iquat = full.body_ipos[i], full.body_iquat[i]
 
 
-def _contacts(full: mujoco.MjModel) -> dict[int, dict[str, Any]]:
+def _contacts(full: mujoco.MjModel) -> dict[int, dict[str, int | float | np.ndarray]]:
     """Return each geom's contact with the floor, as MuJoCo mixes it.
 
     The contacts are found by sinking the body into the floor.

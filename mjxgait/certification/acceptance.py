@@ -17,6 +17,9 @@ from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.starts import Starts
 
+Wish = Mapping[str, Any]
+"""Requested targets by name, as in a champion's file; a task knows the types of its own."""
+
 
 class AcceptanceCriteria(Protocol):
     """Acceptance criteria of one task; `StaysUp` implements the part on disturbed simulations."""
@@ -38,7 +41,7 @@ class AcceptanceCriteria(Protocol):
     worth: float
     """Least share of successful trials in evolution for an individual to be worth validating."""
 
-    def asked(self, wish: Mapping[str, Any]) -> "AcceptanceCriteria":
+    def asked(self, wish: Wish) -> "AcceptanceCriteria":
         """Return the criteria with those of the requested targets, by name."""
         ...
 
@@ -107,7 +110,7 @@ class AcceptanceCriteria(Protocol):
         """
         ...
 
-    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """Return numbers without a threshold; `summary` is a line for the screen."""
         ...
 
@@ -140,7 +143,7 @@ class Unasked:
 
     revision: int = 0
 
-    def asked(self, wish: Mapping[str, Any]) -> Any:
+    def asked(self, wish: Wish) -> Any:
         """See `AcceptanceCriteria`: the same."""
         return self
 
@@ -251,7 +254,7 @@ class PlainCriteria(StaysUp):
             parts(window, config.parts),
         )
 
-    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """See `AcceptanceCriteria`."""
         window = whole.window(config.warmup)
         v = speed(window)
@@ -268,7 +271,7 @@ class PlainCriteria(StaysUp):
         return (upright(whole, window, config.upright), *self.task.criteria(window))
 
 
-def acceptance_of(task: str, wish: Mapping[str, Any] | None = None) -> AcceptanceCriteria:
+def acceptance_of(task: str, wish: Wish | None = None) -> AcceptanceCriteria:
     """Return the criteria of a task, with those of the requested targets.
 
     Raises:
@@ -277,7 +280,7 @@ def acceptance_of(task: str, wish: Mapping[str, Any] | None = None) -> Acceptanc
     return _made(task_kind(task)).asked(wish or {})
 
 
-def how_simulated(task: str, wish: Mapping[str, Any] | None = None) -> AcceptanceCriteria | StaysUp:
+def how_simulated(task: str, wish: Wish | None = None) -> AcceptanceCriteria | StaysUp:
     """Return a task's goals, falls and turns for a simulation; the usual ones if it is unknown."""
     kind = known_task(task)
     return (_made(kind) if kind else StaysUp()).asked(wish or {})

@@ -14,7 +14,7 @@ from mjxgait.certification.check_body import check_body
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
 from mjxgait.certification.trials import AIMS, simulate, told_to_turn
-from mjxgait.certification.verdict import Verdict, judge, judged
+from mjxgait.certification.verdict import Document, MeasureEntry, Verdict, judge, judged
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording, measure
@@ -83,7 +83,7 @@ class Certificate:
         """Return the text of `certificate.json`."""
         return json.dumps(self.document(), indent=2, allow_nan=False) + "\n"
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Document:
         """Return the content of `certificate.json`; non-finite numbers become null."""
         document = {
             "schema": schema_of(self.task),
@@ -108,7 +108,7 @@ class Certificate:
             "config": dataclasses.asdict(self.config),
             "seconds": round(self.seconds, 2),
         }
-        found: dict[str, Any] = _finite(document)
+        found: Document = _finite(document)
         return found
 
 
@@ -283,7 +283,7 @@ def half_point(shares: dict[float, float]) -> float | None:
     return 0.0 if steps[0][1] <= 0.5 else None
 
 
-def _bears(shares: dict[float, float]) -> dict[str, Any]:
+def _bears(shares: dict[float, float]) -> dict[str, object]:
     """Return the report's entries on pushes, from shares of survivors by push speed."""
     return {
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
@@ -296,7 +296,7 @@ def schema_of(task: str) -> int:
     return SCHEMA + how_simulated(task).revision
 
 
-def _entry(measure: criteria.Measure) -> dict[str, Any]:
+def _entry(measure: criteria.Measure) -> MeasureEntry:
     return {
         "name": measure.name,
         "value": measure.value,
@@ -308,7 +308,7 @@ def _entry(measure: criteria.Measure) -> dict[str, Any]:
     }
 
 
-def _finite(value: Any) -> Any:
+def _finite(value: object) -> Any:
     match value:
         case dict():
             return {k: _finite(v) for k, v in value.items()}

@@ -13,6 +13,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -78,7 +79,7 @@ class _Body:
         self.data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, self.data)
 
-    def facts(self, creature: Creature) -> Iterator[tuple[str, Any, Any]]:
+    def facts(self, creature: Creature) -> Iterator[tuple[str, ArrayLike, ArrayLike]]:
         """Yield each fact: name, value of the creature, value by its files."""
         forward, left, up = self.axes()
         stand = np.array([self.stand[j.qposadr[0]] for j in self.joints])
@@ -244,7 +245,7 @@ class _Body:
         place = self.data.xanchor[[j.id for j in self.joints]] - self.data.xpos[self.trunk.id]
         return place, self.data.xmat[moved].reshape(-1, 3, 3).copy()
 
-    def setting(self, joint: str, key: str, default: Any = None) -> Any:
+    def setting(self, joint: str, key: str, default: object = None) -> Any:
         """Setting of a joint: that of all joints, overridden by matching exceptions in order."""
         value = self.table["joints"].get(key, default)
         for exception in self.table.get("joint", []):
@@ -268,5 +269,5 @@ class _Body:
         return int(self.model.body(name).id)
 
 
-def _show(value: Any) -> str:
+def _show(value: ArrayLike) -> str:
     return np.array2string(np.asarray(value), precision=6, threshold=8)

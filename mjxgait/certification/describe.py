@@ -83,7 +83,7 @@ def duties_apart(window: Recording) -> float:
     return max((abs(float(duty[a] - duty[b])) for a, b in pairs_of(window)), default=0.0)
 
 
-def sides(window: Recording) -> dict[str, Any] | None:
+def sides(window: Recording) -> dict[str, object] | None:
     """Return the report's entry on left and right; None for a body without two like sides."""
     if not window.dimensions.partner:
         return None
@@ -148,7 +148,7 @@ def standing(window: Recording) -> float:
     return float(np.abs(middles).mean() / size.hip_height)
 
 
-def describe(window: Recording, clearance: float) -> dict[str, Any]:
+def describe(window: Recording, clearance: float) -> dict[str, object]:
     """Return the report's numbers. clearance: rise of a foot in a swing, in hip heights."""
     size = window.dimensions
     v, frequency = speed(window), stride_frequency(window, clearance)
@@ -175,7 +175,7 @@ def slip_distance(window: Recording) -> np.ndarray:
     return (window.foot_slip * window.contact).sum(0) * window.time_step
 
 
-def worst_overlap(window: Recording) -> dict[str, Any] | None:
+def worst_overlap(window: Recording) -> dict[str, object] | None:
     """Two parts with the deepest overlap: depth in m, and share of frames; None without overlap."""
     depth = np.nan_to_num(window.overlap)
     if not depth.any():

@@ -5,7 +5,6 @@ Letters: `S` simulations.
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 
@@ -75,7 +74,7 @@ class Stress:
         verdict = "It walks anywhere." if self.passed else "It does not walk anywhere yet."
         return [*lines, verdict]
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Return the content of `stress.json`."""
         return {"schema": 1, "passed": self.passed} | dataclasses.asdict(self)
 
@@ -117,7 +116,9 @@ def _trials(
     rng = common(CertificateConfig()).generator
     plain = perturbed_starts(creature, config.starts, rng(0))
 
-    def walked(starts: Starts, body: Creature = creature, seconds: float = config.seconds) -> Any:
+    def walked(
+        starts: Starts, body: Creature = creature, seconds: float = config.seconds
+    ) -> Callable[[], list[Outcome]]:
         return lambda: [simulate(body, champion, starts, seconds, threads=threads)]
 
     def bumps() -> list[Outcome]:

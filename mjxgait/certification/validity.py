@@ -1,9 +1,9 @@
 """Readers of `certificate.json` and `stress.json`, and the check that they are of this champion."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, TypedDict, cast
 
 import numpy as np
 import pydantic
@@ -11,7 +11,7 @@ import pydantic
 from mjxgait.certification.certificate import schema_of
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.certification.stress import TRIALS, StressConfig
-from mjxgait.certification.verdict import criteria_of, judged
+from mjxgait.certification.verdict import Document, criteria_of, judged
 from mjxgait.champion import Champion
 from mjxgait.config.tables import STORED, Flag, Index, Number, Text, check
 from mjxgait.creature import Creature
@@ -66,7 +66,7 @@ class _Certificate:
     schema: Index = 0
     champion: Text = ""
     task: Text = ""
-    config: dict[str, Any] = dataclasses.field(default_factory=dict)
+    config: dict[str, object] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.passed and self.margin is None:
@@ -90,16 +90,34 @@ class _Stress:
     champion: Text = ""
 
 
-def read_certificate(path: Path) -> dict[str, Any] | None:
+class TrialEntry(TypedDict):
+    """A trial in `stress.json`; see `Trial`."""
+
+    name: str
+    share: float
+    passed: bool
+
+
+class StressDocument(TypedDict):
+    """Content of `stress.json`, and what `read_stress` derives from it."""
+
+    champion: str
+    config: dict[str, float]
+    trials: list[TrialEntry]
+    passed: bool
+    reservation: str
+
+
+def read_certificate(path: Path) -> Document | None:
     """Read what `Certificate.to_json` wrote; None if there is no file.
 
     Raises:
       UserError: it is not a certificate.
     """
-    return _read(path, _Certificate, "certify")
+    return cast(Document | None, _read(path, _Certificate, "certify"))
 
 
-def read_stress(path: Path, champion: Champion) -> dict[str, Any] | None:
+def read_stress(path: Path, champion: Champion) -> StressDocument | None:
     """Read what `Stress.document` says of this champion; None without a file on this champion.
 
     `passed`, of each trial and of all, is derived from the shares by the shipped settings.
@@ -120,7 +138,8 @@ def read_stress(path: Path, champion: Champion) -> dict[str, Any] | None:
     elif len(trials) < TRIALS and all(trial["passed"] for trial in trials):
         reservation = f"only {len(trials)} of {TRIALS} stress tests were run"
     passed = not reservation and all(trial["passed"] for trial in trials)
-    return document | {"trials": trials, "reservation": reservation, "passed": passed}
+    found = document | {"trials": trials, "reservation": reservation, "passed": passed}
+    return cast(StressDocument, found)
 
 
 def _read(path: Path, schema: type, command: str) -> dict[str, Any] | None:
@@ -137,7 +156,7 @@ def _read(path: Path, schema: type, command: str) -> dict[str, Any] | None:
     return dict(document)
 
 
-def outdated(document: dict[str, Any], champion: Champion, creature: Creature) -> str | None:
+def outdated(document: Document, champion: Champion, creature: Creature) -> str | None:
     """Return a sentence on why a certificate does not count for this champion; None if it counts.
 
     A certificate counts for its own champion, task, ground and schema. File times prove nothing:
@@ -170,12 +189,20 @@ On one machine with the same versions of MuJoCo and NumPy nothing differs.
 """
 
 
-def differences(stored: Mapping[str, Any], again: Mapping[str, Any]) -> list[str]:
+IDENTITY: tuple[Literal["champion", "creature_digest", "task"], ...] = (
+    "champion",
+    "creature_digest",
+    "task",
+)
+"""Keys of a certificate that say what was examined."""
+
+
+def differences(stored: Document, again: Document) -> list[str]:
     """Return the differences between a stored certificate and a new one, a phrase each.
 
     Seconds, attempts and numbers without a criterion do not count.
     """
-    named = {key: (stored.get(key), again[key]) for key in ("champion", "creature_digest", "task")}
+    named: dict[str, tuple[object, object]] = {key: (stored.get(key), again[key]) for key in IDENTITY}
     named["ground"] = (stored.get("report", {}).get("ground"), again["report"]["ground"])
     found = [f"{key}: {one}, again {two}" for key, (one, two) in named.items() if one != two]
     found += _measures(criteria_of(stored), criteria_of(again))

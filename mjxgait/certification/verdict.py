@@ -5,7 +5,7 @@ A stored certificate is evaluated like a new one: the result that it states is o
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal, NotRequired, Required, TypedDict, cast
 
 import numpy as np
 
@@ -13,6 +13,45 @@ from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.config.tables import flat
 from mjxgait.kinds import known_task, tasks
+
+
+class MeasureEntry(TypedDict, total=False):
+    """A measure in `certificate.json`; see `Measure`."""
+
+    name: Required[str]
+    value: Required[float | None]
+    sense: Required[Literal[">=", "<="]]
+    threshold: Required[float | None]
+    passed: Required[bool]
+    room: float | None
+    margin: float | None
+
+
+class CriterionEntry(TypedDict):
+    """A criterion in `certificate.json`; see `Criterion`."""
+
+    number: int
+    name: NotRequired[str]
+    passed: bool
+    margin: NotRequired[float | None]
+    measures: list[MeasureEntry]
+
+
+class Document(TypedDict, total=False):
+    """Content of `certificate.json`; see `Certificate`. Earlier versions lack some keys."""
+
+    schema: int
+    creature: str
+    creature_digest: str
+    task: str
+    champion: str
+    passed: Required[bool]
+    margin: Required[float | None]
+    attempts: int
+    criteria: Required[list[CriterionEntry]]
+    report: dict[str, Any]
+    config: dict[str, object]
+    seconds: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,8 +103,9 @@ def judge(criteria: Sequence[Criterion]) -> Verdict:
     return Verdict(bool(criteria) and not failed, margin, failed)
 
 
-def judged(document: Mapping[str, Any]) -> Verdict:
-    """Evaluate a stored certificate; see `validity.read_certificate`."""
+def judged(certificate: Mapping[str, Any]) -> Verdict:
+    """Evaluate a stored certificate, a `Document`; see `validity.read_certificate`."""
+    document = cast(Document, certificate)
     verdict = judge(criteria_of(document))
     return dataclasses.replace(
         verdict,
@@ -74,7 +114,7 @@ def judged(document: Mapping[str, Any]) -> Verdict:
     )
 
 
-def criteria_of(document: Mapping[str, Any]) -> tuple[Criterion, ...]:
+def criteria_of(document: Document) -> tuple[Criterion, ...]:
     """Return the criteria of a stored certificate, without the results that it states."""
     return tuple(
         Criterion(c["number"], c.get("name", ""), tuple(map(_measure, c["measures"])))
@@ -82,7 +122,7 @@ def criteria_of(document: Mapping[str, Any]) -> tuple[Criterion, ...]:
     )
 
 
-def other_rules(document: Mapping[str, Any]) -> Iterator[str]:
+def other_rules(document: Document) -> Iterator[str]:
     """Yield each threshold of a stored certificate that is not the shipped one.
 
     Thresholds of other tasks do not count, nor those that an older certificate lacks.
@@ -98,7 +138,7 @@ def other_rules(document: Mapping[str, Any]) -> Iterator[str]:
             yield f"{key} = {own[key]} instead of {shipped}"
 
 
-def _contradiction(document: Mapping[str, Any], verdict: Verdict) -> str:
+def _contradiction(document: Document, verdict: Verdict) -> str:
     """Return a sentence if a stored result is not that of its measures; else empty."""
     said = {c["number"]: c["passed"] for c in document["criteria"]}
     wrong = [c.number for c in criteria_of(document) if said[c.number] != c.passed]
@@ -111,7 +151,7 @@ def _contradiction(document: Mapping[str, Any], verdict: Verdict) -> str:
     return f"the file contradicts itself: it says {stored}, its measures say {measured}"
 
 
-def _measure(entry: Mapping[str, Any]) -> Measure:
+def _measure(entry: MeasureEntry) -> Measure:
     value, threshold = _number(entry.get("value")), _number(entry.get("threshold"))
     sense = entry.get("sense")
     return Measure(
@@ -123,7 +163,7 @@ def _measure(entry: Mapping[str, Any]) -> Measure:
     )
 
 
-def _room(entry: Mapping[str, Any], distance: float) -> float:
+def _room(entry: MeasureEntry, distance: float) -> float:
     """Room of a stored measure; derived from the margin in files of earlier versions."""
     if "room" in entry:
         return max(_number(entry["room"]), 0.0)
@@ -131,7 +171,7 @@ def _room(entry: Mapping[str, Any], distance: float) -> float:
     return distance / margin if margin > 0 else 0.0
 
 
-def _number(value: Any) -> float:
+def _number(value: object) -> float:
     """Number from a JSON value; NaN for all else."""
     return (
         float(value) if isinstance(value, int | float) and not isinstance(value, bool) else np.nan

@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import tyro
 
@@ -23,6 +23,10 @@ from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.files import write_text
 from mjxgait.training.folder import CREATURE, is_taken
 from mjxgait.training.stored import locked
+
+if TYPE_CHECKING:
+    from mjxgait.experiments.ablation.plan import Plan, Study
+    from mjxgait.experiments.ablation.rows import News
 
 STUDY = "study.toml"
 OVER = ("env", "seeds", "first_seed", "generations", "config", "rows", "physics")
@@ -142,7 +146,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
 def _run(
     folder: Path,
     creature: Creature,
-    plan: Any,
+    plan: "Plan",
     screen: "_Progress",
     cluster: str | None,
     begin: Callable[[], object] | None,
@@ -165,7 +169,7 @@ def _run(
 class _Progress:
     """Progress as plain lines; the time left is estimated from the generations so far."""
 
-    def part(self, group: int, count: int, news: dict[str, Any]) -> None:
+    def part(self, group: int, count: int, news: "News") -> None:
         """Report on one program of a study on a cluster, where several run at once."""
         if "compiling" in news:
             return
@@ -175,7 +179,7 @@ class _Progress:
             flush=True,
         )
 
-    def generation(self, group: int, count: int, news: dict[str, Any]) -> None:
+    def generation(self, group: int, count: int, news: "News") -> None:
         where = f"program {group + 1} of {count}" if count > 1 else "all runs"
         if "compiling" in news:
             print(f"{where}: compiling for {news['compiling']} runs side by side", flush=True)
@@ -203,7 +207,7 @@ def _check_new(folder: Path) -> None:
         )
 
 
-def _create(folder: Path, study: Any, creature: Creature) -> None:
+def _create(folder: Path, study: "Study", creature: Creature) -> None:
     """Make the folder of a study, with its exact settings and creature."""
     try:
         (folder / CREATURE).mkdir(parents=True, exist_ok=True)
@@ -214,7 +218,7 @@ def _create(folder: Path, study: Any, creature: Creature) -> None:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
 
 
-def _open(folder: Path) -> tuple[Any, Creature]:
+def _open(folder: Path) -> tuple["Study", Creature]:
     from mjxgait.experiments.ablation.plan import Study
 
     if not (folder / STUDY).is_file():

@@ -2,9 +2,9 @@
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import tyro
 
@@ -12,6 +12,9 @@ from mjxgait.config.layers import data_folder, find_creature
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.files import write_text
+
+if TYPE_CHECKING:
+    from mjxgait.bench.contest import Result
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +55,7 @@ def bench_command(arguments: Sequence[str]) -> int:
         raise UserError("--scaling measures one creature; name it with --env")
     from mjxgait.bench.contest import append_history, ratio_table  # JAX takes a second to import
 
-    results: list[dict[str, Any]] = []
+    results: list[Result] = []
     for folder in folders:
         results.append(_measured(folder, options))
         _write(options.json, _together(results) if len(folders) > 1 else results[0])
@@ -87,7 +90,7 @@ def _grows(folder: Path) -> bool:
     return load_creature(folder).settings.creature.grows
 
 
-def _measured(folder: Path, options: BenchOptions) -> dict[str, Any]:
+def _measured(folder: Path, options: BenchOptions) -> "Result":
     from mjxgait.bench.contest import contest
     from mjxgait.bench.workload import walking
 
@@ -101,7 +104,7 @@ def _measured(folder: Path, options: BenchOptions) -> dict[str, Any]:
     return contest(folder, config, options.rounds, options.generations, _say)
 
 
-def _together(results: list[dict[str, Any]]) -> dict[str, Any]:
+def _together(results: "list[Result]") -> dict[str, object]:
     """Merge the results of several creatures, ratios first."""
     ratios = {
         result["creature"]: {k: v for k, v in result.items() if k.startswith("ratio_over_")}
@@ -114,12 +117,12 @@ def _say(line: str) -> None:
     print(line, flush=True)
 
 
-def _write(file: Path, result: dict[str, Any]) -> None:
+def _write(file: Path, result: Mapping[str, object]) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     write_text(file, json.dumps(result, indent=2) + "\n")
 
 
-def _summary(result: dict[str, Any]) -> str:
+def _summary(result: "Result") -> str:
     from mjxgait.bench.contest import LABELS
 
     lines = []

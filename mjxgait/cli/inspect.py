@@ -4,10 +4,10 @@ import dataclasses
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TypedDict, TypeVar
 
 import tyro
 from rich.console import Console
@@ -15,6 +15,15 @@ from rich.console import Console
 from mjxgait.errors import UserError
 
 PIPED_WIDTH = 160
+Found = TypeVar("Found")
+
+
+class Verified(TypedDict):
+    """Result of `--verify`."""
+
+    run: str
+    equal: bool
+    differences: list[str]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +62,7 @@ def inspect_command(arguments: Sequence[str]) -> int:
     width = None if sys.stdout.isatty() else PIPED_WIDTH
     console = Console(highlight=False, markup=False, width=width)
 
-    def tell(found: Any, show: Any) -> int:
+    def tell(found: Found, show: Callable[[Found, Console], object]) -> int:
         if options.json:
             print(json.dumps(found, indent=2, allow_nan=False))
         else:
@@ -95,7 +104,7 @@ def inspect_command(arguments: Sequence[str]) -> int:
     return tell(inspect.facts(snapshot), partial(inspect.print_facts, few=not options.all))
 
 
-def _verified(options: InspectOptions) -> dict[str, Any]:
+def _verified(options: InspectOptions) -> Verified:
     """Compare a second examination of a run's champion with its certificate."""
     others = options.generation, options.individual, options.diff
     if options.path is None or any(option is not None for option in others) or options.all:
@@ -106,7 +115,7 @@ def _verified(options: InspectOptions) -> dict[str, Any]:
     return {"run": str(options.path), "equal": not differences, "differences": differences}
 
 
-def _print_verified(found: dict[str, Any], console: Console) -> None:
+def _print_verified(found: Verified, console: Console) -> None:
     if found["equal"]:
         console.print("Examined again: every measure is that of the certificate.", markup=False)
         return

@@ -4,12 +4,16 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from mjxgait.errors import UserError
 from mjxgait.files import replaced
+
+if TYPE_CHECKING:
+    from mjxgait.rendering.stage import Stage
+    from mjxgait.rendering.video import Runner
 
 MOST_RUNNERS = 12
 SIZE = (640, 360)
@@ -127,7 +131,7 @@ def _check(options: RenderOptions) -> list[int]:
     return generations
 
 
-def _backend(stage: Any, options: RenderOptions, wanted: str | None) -> str | None:
+def _backend(stage: "Stage", options: RenderOptions, wanted: str | None) -> str | None:
     """Return the GL backend to draw with, None for the painter; print the choice.
 
     Raises:
@@ -144,7 +148,7 @@ def _backend(stage: Any, options: RenderOptions, wanted: str | None) -> str | No
     return backend
 
 
-def _still(runners: list[Any], stage: Any, options: RenderOptions) -> None:
+def _still(runners: Sequence["Runner"], stage: "Stage", options: RenderOptions) -> None:
     """Write a filmstrip of one walk, or a picture of the end of a race."""
     from mjxgait.rendering import video
     from mjxgait.rendering.filmstrip import SIZE as EACH

@@ -4,7 +4,7 @@ import dataclasses
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import tyro
@@ -26,6 +26,9 @@ from mjxgait.training.folder import (
     open_run,
 )
 from mjxgait.training.stored import disk_errors, locked
+
+if TYPE_CHECKING:
+    from mjxgait.distributed.jobs import Advanced
 
 MAP = "map.png"
 OF_FILES = ("rate", "travelling", "blends", "cluster")
@@ -183,7 +186,7 @@ def _settings(options: RepertoireOptions, creature: Creature) -> Config:
     config = resolve_config(creature.settings.train, creature.name, Path(options.config))
     config = wished(config, creature, Wishes(gait=options.gait, style=options.style))
     short = {"population": options.population, "generations": options.generations}
-    table: dict[str, Any] = {"evolution": {k: v for k, v in short.items() if v is not None}}
+    table: dict[str, object] = {"evolution": {k: v for k, v in short.items() if v is not None}}
     table |= {} if options.seed is None else {"seed": options.seed}
     table |= {} if options.physics is None else {"rollout": {"physics": options.physics}}
     return build(type(config), merge(dataclasses.asdict(config), table), "the options")
@@ -239,7 +242,7 @@ class _Screen:
     def __init__(self, console: Console) -> None:
         self.console = console
 
-    def evolved(self, name: str, generation: int, last: int, done: Any) -> None:
+    def evolved(self, name: str, generation: int, last: int, done: "Advanced | None") -> None:
         if done is None:
             self.console.print(f"{name}: compiling")
             return

@@ -1,17 +1,20 @@
 """`mjxgait train --runs`: several runs side by side."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from mjxgait.errors import INTERRUPTED
 from mjxgait.experiments.multi_seed import read_seeds
 from mjxgait.files import replaced
-from mjxgait.training.folder import command, open_run
+from mjxgait.training.folder import Line, command, open_run
 from mjxgait.training.stored import disk_errors, locked
+
+if TYPE_CHECKING:
+    from mjxgait.distributed.jobs import Advanced
 
 PICTURE = "zoo.png"
 
@@ -74,7 +77,7 @@ class _Screen:
     def __init__(self, console: Console) -> None:
         self.console = console
 
-    def evolved(self, generation: int, last: int, done: Any) -> None:
+    def evolved(self, generation: int, last: int, done: "Advanced | None") -> None:
         if done is None:
             self.console.print("compiling")
             return
@@ -89,5 +92,5 @@ class _Screen:
         self.console.print(f"examined in C MuJoCo: {count} of {of}")
 
 
-def _best(lines: list[list[dict[str, Any]]]) -> list[float | None]:
+def _best(lines: Sequence[Sequence[Line]]) -> list[float | None]:
     return [line["best"] for line in lines[-1]] if lines else []

@@ -9,6 +9,7 @@ import collections
 import dataclasses
 import functools
 import hashlib
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -290,5 +291,5 @@ def _parts(rows: np.ndarray) -> Vector:
     return rows[0], rows[1], rows[2]
 
 
-def _dot(a: Any, b: Any) -> Numbers:
+def _dot(a: Sequence[Numbers], b: Sequence[Numbers]) -> Numbers:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

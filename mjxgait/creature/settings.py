@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import pydantic
 
@@ -169,4 +169,4 @@ class CreatureSettings:
     stepping: Stepping = dataclasses.field(default_factory=Stepping)
     termination: Termination = dataclasses.field(default_factory=Termination)
     usual: Usual = dataclasses.field(default_factory=Usual)
-    train: dict[str, Any] = dataclasses.field(default_factory=dict)
+    train: dict[str, object] = dataclasses.field(default_factory=dict)

@@ -4,7 +4,6 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -42,7 +41,7 @@ from mjxgait.importer.worker import (
     compile_apart,
     compile_here,
 )
-from mjxgait.importer.write_toml import creature_toml, manner
+from mjxgait.importer.write_toml import Settings, creature_toml, manner
 
 XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
 """Files of a creature folder that an import makes."""
@@ -256,7 +255,7 @@ def _stated_pairs(
     }
 
 
-def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> dict[str, Any]:
+def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> Settings:
     """Return the table `[train]`. stated_length: m, of a body shorter than its legs."""
     model, data = best.model, mujoco.MjData(best.model)
     data.qpos[:] = best.qpos

@@ -3,7 +3,6 @@
 import fnmatch
 import re
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import Anatomy
-from mjxgait.importer.parts import FREE, HINGE, SLIDE, Notes, listed
+from mjxgait.importer.parts import FREE, HINGE, SLIDE, Notes, Shape, listed
 
 SAME_LEVEL = 0.2
 """Share of the creature's height: limbs that end this close to the lowest point are legs."""
@@ -149,7 +148,10 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
         clouds = [(b, s) for b in _below(model, anatomy, end) for s in anatomy.shapes[b]]
 
         def height(
-            q: np.ndarray, end: int = end, adr: np.ndarray = adr, clouds: list[Any] = clouds
+            q: np.ndarray,
+            end: int = end,
+            adr: np.ndarray = adr,
+            clouds: list[tuple[int, Shape]] = clouds,
         ) -> float:
             data.qpos[adr] = q
             mujoco.mj_kinematics(model, data)

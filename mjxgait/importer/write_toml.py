@@ -7,6 +7,7 @@ import numpy as np
 import tomli_w
 
 from mjxgait.config.schema import Config
+from mjxgait.config.tables import Table
 from mjxgait.controllers.key_poses.config import unhurried
 from mjxgait.importer.drive import Drive
 from mjxgait.importer.parts import Confidence, Notes, one_line
@@ -51,6 +52,8 @@ SMALLER = 0.03
 ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
+Settings = dict[str, Any]
+"""Tables of settings, as in creature.toml below `[train]`."""
 Told = tuple[str, Confidence, str]
 """The choice, its confidence and its reason."""
 
@@ -66,7 +69,7 @@ def manner(
     time_step: float,
     rotor: float,
     notes: Notes,
-) -> dict[str, Any]:
+) -> Settings:
     """Return the table `[train]` of an imported creature, and report its reason.
 
     Args:
@@ -82,20 +85,20 @@ def manner(
     else:
         settings, told = four_feet(bounces)
     notes.guess("train", *told)
-    table = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings
+    table: Settings = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings
     if not symmetric:
         table.setdefault("controller", {})["key_poses"] = 2 * Config().controller.key_poses
     return table
 
 
-def four_feet(bounces: bool) -> tuple[dict[str, Any], Told]:
+def four_feet(bounces: bool) -> tuple[Settings, Told]:
     """Settings of a body that stands on its feet; see `manner`.
 
     bounces: whether its motors are heavier to turn than all of it. A foot counts as down if it
     bears weight, because a foot near the floor need not. Other bodies learn more slowly with that
     rule.
     """
-    fitness: dict[str, Any] = {"weights": {"foot_speed": WHIPPED}}
+    fitness: Settings = {"weights": {"foot_speed": WHIPPED}}
     what = "other starts in each generation; small mutations; feet that swing too fast cost"
     why = "of what robots' joints do at random little stands, and much of it whips"
     if bounces:
@@ -107,7 +110,7 @@ def four_feet(bounces: bool) -> tuple[dict[str, Any], Told]:
 
 def many_hinges(
     bounces: bool, hip: float, length: float, time_step: float
-) -> tuple[dict[str, Any], Told]:
+) -> tuple[Settings, Told]:
     """Settings of a body that stands on its feet, but in few poses of many; see `manner`."""
     settings, (what, _, _) = four_feet(bounces)
     settings["fitness"]["weights"] |= {"alive": ALIVE, "frequency": HASTY}
@@ -122,12 +125,12 @@ def many_hinges(
 
 def few_feet(
     legs: int, hip: float, length: float, mass: float, time_step: float
-) -> tuple[dict[str, Any], Told]:
+) -> tuple[Settings, Told]:
     """Settings of a body that must step to catch a fall; see `manner`."""
     hertz = BRISK * length / (STRIDE * hip)
     calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
     weights = {"alive": ALIVE, "frequency": HASTY}
-    fitness: dict[str, Any] = {"speed": BRISK, "frequency": round(calm, 2), "weights": weights}
+    fitness: Settings = {"speed": BRISK, "frequency": round(calm, 2), "weights": weights}
     speed = f"{BRISK:g} body lengths/s in strides of {STRIDE:g} hip heights"
     if legs == 1:
         fitness |= {"speed": LEAPING, "hardening": RISES}
@@ -167,7 +170,7 @@ def creature_toml(
     mirror: tuple[bool, dict[str, tuple[str, int]]],
     body_length: float | None,
     planar: bool,
-    train: Mapping[str, Any],
+    train: Table,
     notes: Notes,
 ) -> str:
     """Return the text of creature.toml.

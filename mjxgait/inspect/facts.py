@@ -7,7 +7,7 @@ import dataclasses
 import datetime
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TypedDict
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +19,8 @@ from mjxgait.certification import (
     read_stress,
 )
 from mjxgait.certification.describe import in_words
+from mjxgait.certification.validity import StressDocument
+from mjxgait.certification.verdict import Document
 from mjxgait.config.tables import flat
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import Origin
@@ -27,7 +29,7 @@ from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.plugins import make_task, resolve_config
 from mjxgait.plugins.registry import what_ends
 from mjxgait.tasks.base import Task
-from mjxgait.training.folder import CERTIFICATE, STRESS, kept_champion
+from mjxgait.training.folder import CERTIFICATE, STRESS, Line, kept_champion
 from mjxgait.training.stored import running
 
 KINDS = {
@@ -38,7 +40,7 @@ KINDS = {
 }
 
 
-def facts(snapshot: Snapshot) -> dict[str, Any]:
+def facts(snapshot: Snapshot) -> dict[str, object]:
     """Return all facts about a checkpoint."""
     return {
         "run": str(snapshot.run),
@@ -107,7 +109,19 @@ def _anywhere(snapshot: Snapshot) -> str:
     return f" It does not walk anywhere: {', '.join(short)}."
 
 
-def verdict(snapshot: Snapshot) -> dict[str, Any] | None:
+class Summary(TypedDict):
+    """Main values of a certificate; see `verdict`."""
+
+    certified: bool
+    failed: list[int]
+    reservation: str
+    anywhere: bool | None
+    margin: float | None
+    speed: float | None
+    gait: str | None
+
+
+def verdict(snapshot: Snapshot) -> Summary | None:
     """Return the main values of the champion's certificate; None if it has no valid one.
 
     speed: m/s. gait: its name. Both are None for other tasks than walking. anywhere: whether it
@@ -128,7 +142,7 @@ def verdict(snapshot: Snapshot) -> dict[str, Any] | None:
     }
 
 
-def _certificate(snapshot: Snapshot) -> dict[str, Any] | str:
+def _certificate(snapshot: Snapshot) -> Document | str:
     """Return the certificate of the run's champion, or the reason why it has no valid one."""
     if snapshot.trouble:
         return snapshot.trouble
@@ -142,7 +156,7 @@ def _certificate(snapshot: Snapshot) -> dict[str, Any] | str:
         return str(error)
 
 
-def _stress(snapshot: Snapshot) -> dict[str, Any] | None:
+def _stress(snapshot: Snapshot) -> StressDocument | None:
     """Results of the champion's stress tests; None without any."""
     try:
         champion = kept_champion(snapshot.run, snapshot.creature)
@@ -151,7 +165,7 @@ def _stress(snapshot: Snapshot) -> dict[str, Any] | None:
         return None
 
 
-def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
+def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, object]]:
     """Return the settings that differ from configs/default.toml, by dotted key: default and this
     run's value.
     """
@@ -165,7 +179,7 @@ def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
     }
 
 
-def fitness_summary(fitness: np.ndarray) -> dict[str, Any]:
+def fitness_summary(fitness: np.ndarray) -> Mapping[str, float | None]:
     """Return best, quartiles, mean and worst of the finite fitness values [P], and the number of
     others.
     """
@@ -194,9 +208,20 @@ def fitness_summary(fitness: np.ndarray) -> dict[str, Any]:
     }
 
 
-def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+class Spell(TypedDict):
+    """A forced phase; see `forced_spells`."""
+
+    first: int
+    last: int
+    best_before: float | None
+    best_after: float | None
+    mean_before: float | None
+    mean_after: float | None
+
+
+def forced_spells(lines: Sequence[Line]) -> list[Spell]:
     """Return each forced phase: first and last generation, fitness before and after."""
-    spells = []
+    spells: list[Spell] = []
     for forced, group in itertools.groupby(
         range(len(lines)), key=lambda i: bool(lines[i]["forced"])
     ):
@@ -245,7 +270,18 @@ def contributions(snapshot: Snapshot) -> np.ndarray:
     return (worst * terms[np.arange(len(terms)), lowest] + (1 - worst) * terms.mean(1)) * weights
 
 
-def population(snapshot: Snapshot) -> list[dict[str, Any]]:
+class Ranked(TypedDict):
+    """An individual's row; see `population`."""
+
+    rank: int
+    fitness: float | None
+    born: int
+    age: int
+    kind: str
+    contributions: dict[str, float | None]
+
+
+def population(snapshot: Snapshot) -> list[Ranked]:
     """Return one row per individual, best first."""
     parts, arrays, names = contributions(snapshot), snapshot.arrays, terms_of(snapshot)
     return [
@@ -263,14 +299,14 @@ def population(snapshot: Snapshot) -> list[dict[str, Any]]:
     ]
 
 
-def diversity(snapshot: Snapshot) -> dict[str, Any]:
+def diversity(snapshot: Snapshot) -> dict[str, object]:
     """Return the number of different genomes, and their spread."""
     rows = snapshot.rows
     found = {"individuals": len(rows), "unique": len(np.unique(rows, axis=0))}
     return found | view_of(snapshot.config.use.controller).spread(snapshot)
 
 
-def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
+def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, object]:
     """Return the facts about one individual; rank 1 is the best.
 
     Raises:
@@ -293,6 +329,6 @@ def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
     )
 
 
-def number(value: Any) -> float | None:
+def number(value: float) -> float | None:
     """Return a number for JSON; None if it is not finite."""
     return float(value) if np.isfinite(value) else None

@@ -1,14 +1,14 @@
 """Summary of a folder of runs: one line each."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from mjxgait.errors import UserError
 from mjxgait.inspect.facts import facts
+from mjxgait.inspect.sections import Facts
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.inspect.text import ago, show
 from mjxgait.training.folder import CONFIG
@@ -22,18 +22,18 @@ def runs_in(folder: Path) -> list[Path]:
     return sorted(entry for entry in folder.iterdir() if (entry / CONFIG).is_file())
 
 
-def just_begun(path: Path) -> dict[str, Any] | None:
+def just_begun(path: Path) -> dict[str, object] | None:
     """Return the summary of a running run without a checkpoint; None for others."""
     who = None if stored_generations(path) else running(path)
     return {"run": str(path), "problem": None, "running": who} if who else None
 
 
-def print_just_begun(line: Mapping[str, Any], console: Console) -> None:
+def print_just_begun(line: Facts, console: Console) -> None:
     """Print one sentence; see `just_begun`."""
     console.print(f"{line['run']}: {why_empty(Path(line['run']))}", markup=False)
 
 
-def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
+def list_runs(runs: Sequence[Path]) -> list[dict[str, object]]:
     """Return a summary of each run.
 
     `problem` is the reason why a run cannot be read; `running` names the process that writes it.
@@ -63,7 +63,7 @@ def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
     return lines
 
 
-def print_runs(lines: Sequence[Mapping[str, Any]], console: Console) -> None:
+def print_runs(lines: Sequence[Facts], console: Console) -> None:
     """Print the runs as a table, with the problems below."""
     table = Table(box=None, pad_edge=False)
     numbers = ("generation", "best", "seed", "margin", "m/s")
@@ -100,7 +100,7 @@ def _rounded(value: float | None) -> str:
     return "" if value is None else f"{value:.2f}"
 
 
-def _state(line: Mapping[str, Any]) -> str:
+def _state(line: Facts) -> str:
     """Return the state of a run in a few words, or the reservation of its verdict."""
     if line["running"]:
         return "running"

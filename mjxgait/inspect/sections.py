@@ -3,10 +3,11 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, Protocol, TypedDict
 
 import numpy as np
 import pydantic
+from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.table import Table
 from typing_extensions import override
@@ -14,8 +15,11 @@ from typing_extensions import override
 from mjxgait.config.tables import STORED, Index, Number
 from mjxgait.inspect.snapshot import Snapshot, shared
 from mjxgait.kinds import known_controller
-from mjxgait.training.folder import ISLANDS, METRICS, MIGRATIONS, read_metrics, read_records
+from mjxgait.training.folder import ISLANDS, METRICS, MIGRATIONS, Line, read_metrics, read_records
 from mjxgait.training.stored import is_number
+
+Facts = Mapping[str, Any]
+"""Values of a report by name, ready for JSON; each kind of genome has names of its own."""
 
 
 def show(value: float | None, sign: bool = False) -> str:
@@ -42,7 +46,7 @@ def print_pairs(rows: Mapping[str, str], console: Console) -> None:
     console.print(table)
 
 
-def print_columns(title: str, rows: Mapping[str, list[Any]], console: Console) -> None:
+def print_columns(title: str, rows: Mapping[str, Sequence[object]], console: Console) -> None:
     """Print the values of A and B side by side."""
     if not rows:
         console.print(f"\n{title}: no difference")
@@ -55,7 +59,7 @@ def print_columns(title: str, rows: Mapping[str, list[Any]], console: Console) -
     console.print(table)
 
 
-def title(individual: Mapping[str, Any]) -> str:
+def title(individual: Facts) -> str:
     """Return an individual's title."""
     return "champion" if individual["rank"] == 1 else f"individual {individual['rank']}"
 
@@ -63,25 +67,23 @@ def title(individual: Mapping[str, Any]) -> str:
 class GenomeView(Protocol):
     """One kind of genome, as values for `--json` and as tables for the screen."""
 
-    def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
+    def facts(self, snapshot: Snapshot, i: int) -> dict[str, object]:
         """Return the genome of the individual in place `i`."""
         ...
 
-    def spread(self, snapshot: Snapshot) -> dict[str, Any]:
+    def spread(self, snapshot: Snapshot) -> dict[str, object]:
         """Return the standard deviation of the genomes' values over the population."""
         ...
 
-    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
+    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, object]:
         """Return the difference of two populations and their champions; has `same_individuals`."""
         ...
 
-    def show(
-        self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
-    ) -> None:
+    def show(self, individual: Facts, spread: Facts | None, console: Console) -> None:
         """Print an individual's genome, and the spread of the population."""
         ...
 
-    def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
+    def show_difference(self, found: Facts, console: Console) -> None:
         """Print a difference."""
         ...
 
@@ -90,15 +92,15 @@ class PlainView(GenomeView):
     """Report of named arrays, for every kind without its own report."""
 
     @override
-    def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
+    def facts(self, snapshot: Snapshot, i: int) -> dict[str, object]:
         return {"genome": {name: array[i].tolist() for name, array in snapshot.genomes.items()}}
 
     @override
-    def spread(self, snapshot: Snapshot) -> dict[str, Any]:
+    def spread(self, snapshot: Snapshot) -> dict[str, object]:
         spread = {name: array.std(axis=0).tolist() for name, array in snapshot.genomes.items()}
         return {"genome_spread": spread}
 
-    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
+    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, object]:
         """See `GenomeView`: of the arrays that have the same shape in both."""
         mine, other = a.genomes, b.genomes
         alike = [n for n in mine if n in other and mine[n].shape[1:] == other[n].shape[1:]]
@@ -108,15 +110,13 @@ class PlainView(GenomeView):
         }
 
     @override
-    def show(
-        self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
-    ) -> None:
+    def show(self, individual: Facts, spread: Facts | None, console: Console) -> None:
         _print_arrays(f"{title(individual)}: genome", individual["genome"], console)
         if spread:
             _print_arrays("spread over the population", spread["genome_spread"], console)
 
     @override
-    def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
+    def show_difference(self, found: Facts, console: Console) -> None:
         if found["same_individuals"] is None:
             console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
         else:
@@ -131,7 +131,7 @@ def view_of(controller: str) -> GenomeView:
     return view
 
 
-def _print_arrays(heading: str, arrays: Mapping[str, Any], console: Console) -> None:
+def _print_arrays(heading: str, arrays: Mapping[str, ArrayLike], console: Console) -> None:
     table = titled_table(heading, console)
     table.add_column("array")
     table.add_column("values", overflow="fold")
@@ -151,7 +151,21 @@ class _Exchange:
     fitness: Annotated[list[Number], pydantic.Field(min_length=1)]
 
 
-def island_facts(run: Path, last: int) -> list[dict[str, Any]]:
+IslandRow = TypedDict(
+    "IslandRow",
+    {
+        "island": int,
+        "best": float | None,
+        "mean": float | None,
+        "arrived": int,
+        "ahead": int,
+        "from": list[int],
+    },
+)
+"""An island in numbers; see `island_facts`."""
+
+
+def island_facts(run: Path, last: int) -> list[IslandRow]:
     """Return a row per island up to a generation; none if the run has one population.
 
     arrived: number of migrants. ahead: number of exchanges with a migrant above the island's best.
@@ -162,7 +176,7 @@ def island_facts(run: Path, last: int) -> list[dict[str, Any]]:
     return [row for folder in folders if (row := _row(folder, told, last))]
 
 
-def print_islands(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
+def print_islands(rows: Sequence[IslandRow], console: Console) -> None:
     """Print the islands as a table."""
     if not rows:
         return
@@ -176,7 +190,7 @@ def print_islands(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
     console.print(table)
 
 
-def _row(folder: Path, told: Sequence[Mapping[str, Any]], last: int) -> dict[str, Any] | None:
+def _row(folder: Path, told: Sequence[Line], last: int) -> IslandRow | None:
     lines = [line for line in read_metrics(folder / METRICS) if line["generation"] <= last]
     if not lines:
         return None

@@ -7,7 +7,6 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from mjxgait.training.folder import (
     CHAMPION,
     CONFIG,
     METRICS,
+    Line,
     kept_champion,
     open_run,
     read_metrics,
@@ -49,7 +49,7 @@ class Snapshot:
     creature: Creature
     config: Config
     arrays: Mapping[str, np.ndarray]
-    lines: Sequence[Mapping[str, Any]]
+    lines: Sequence[Line]
     generations: Sequence[int]
     versions: Mapping[str, str]
     written: float
@@ -147,7 +147,7 @@ def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
     )
 
 
-def _lines(path: Path, last: int) -> list[dict[str, Any]]:
+def _lines(path: Path, last: int) -> list[Line]:
     """Metrics up to a generation; none if the file is foreign, since the checkpoint alone is still
     useful.
     """

@@ -3,13 +3,13 @@
 import dataclasses
 import datetime
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from rich.console import Console
 
 from mjxgait.config.tables import flat
-from mjxgait.inspect.facts import fitness_summary
+from mjxgait.inspect.facts import Ranked, fitness_summary
 from mjxgait.inspect.sections import (
+    Facts,
     print_columns,
     print_islands,
     print_pairs,
@@ -26,7 +26,7 @@ WIDEST = 60
 """Characters of a sparkline; longer histories are thinned."""
 
 
-def print_facts(facts: Mapping[str, Any], console: Console, few: bool = False) -> None:
+def print_facts(facts: Facts, console: Console, few: bool = False) -> None:
     """Print all facts about a checkpoint; see `facts`. few: only the best of the population."""
     _print_identity(facts, console)
     _print_settings(facts["settings_changed"], console)
@@ -40,7 +40,7 @@ def print_facts(facts: Mapping[str, Any], console: Console, few: bool = False) -
     view_of(facts["controller"]).show(facts["champion"], facts["diversity"], console)
 
 
-def print_individual(individual: Mapping[str, Any], console: Console) -> None:
+def print_individual(individual: Facts, console: Console) -> None:
     """Print all facts about one individual; see `individual_facts`."""
     console.print(
         f"individual {individual['rank']}: fitness {show(individual['fitness'])}, "
@@ -58,7 +58,7 @@ def print_individual(individual: Mapping[str, Any], console: Console) -> None:
     view_of(individual["controller"]).show(individual, None, console)
 
 
-def _print_sizes(individual: Mapping[str, Any], console: Console) -> None:
+def _print_sizes(individual: Facts, console: Console) -> None:
     """Print the sizes of an evolved body."""
     if sizes := individual.get("sizes"):
         console.print("sizes: " + ", ".join(f"{name} {f:.2f}" for name, f in sizes.items()))
@@ -89,7 +89,7 @@ def ago(written: str) -> str:
     return "just now"
 
 
-def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
+def _print_identity(facts: Facts, console: Console) -> None:
     going = "not finished: `mjxgait train --resume` goes on from the latest checkpoint"
     # The champion's certificate ends a run, too.
     alive = facts["running"] and f"runs now: {facts['running']}"
@@ -130,7 +130,7 @@ def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
     print_pairs(rows, console)
 
 
-def _print_settings(changed: Mapping[str, Any], console: Console) -> None:
+def _print_settings(changed: Mapping[str, Mapping[str, object]], console: Console) -> None:
     if not changed:
         console.print("\nAll settings are those of configs/default.toml.")
         return
@@ -142,7 +142,7 @@ def _print_settings(changed: Mapping[str, Any], console: Console) -> None:
     console.print(table)
 
 
-def _print_history(facts: Mapping[str, Any], console: Console) -> None:
+def _print_history(facts: Facts, console: Console) -> None:
     history = facts["history"]
     if not history:
         console.print("\nNo history: metrics.jsonl is missing or damaged.")
@@ -171,7 +171,7 @@ def _print_history(facts: Mapping[str, Any], console: Console) -> None:
         )
 
 
-def _print_population(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
+def _print_population(rows: Sequence[Ranked], console: Console) -> None:
     weight = {
         name: sum(abs(row["contributions"][name] or 0.0) for row in rows)
         for name in rows[0]["contributions"]
@@ -201,7 +201,7 @@ def _print_population(rows: Sequence[Mapping[str, Any]], console: Console) -> No
     console.print(table)
 
 
-def differences(a: Snapshot, b: Snapshot) -> dict[str, Any]:
+def differences(a: Snapshot, b: Snapshot) -> dict[str, object]:
     """Compare settings, fitness, populations and champions of two checkpoints.
 
     Genomes are compared only for the same controller, poses only for the same joints.
@@ -228,7 +228,7 @@ def differences(a: Snapshot, b: Snapshot) -> dict[str, Any]:
     } | (view_of(kinds[0]).difference(a, b) if kinds[0] == kinds[1] else {})
 
 
-def print_differences(found: Mapping[str, Any], console: Console) -> None:
+def print_differences(found: Facts, console: Console) -> None:
     """Print the differences as tables."""
     a, b = found["a"], found["b"]
     heading = {
@@ -254,7 +254,7 @@ def print_differences(found: Mapping[str, Any], console: Console) -> None:
         console.print(f"\nA is moved by {mine}, B by {other}: their genomes cannot be compared.")
 
 
-def _name(snapshot: Snapshot) -> dict[str, Any]:
+def _name(snapshot: Snapshot) -> dict[str, object]:
     return {
         "run": str(snapshot.run),
         "creature": snapshot.creature.name,

@@ -3,7 +3,6 @@
 import dataclasses
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -207,7 +206,7 @@ def _boxed(axes: Axes, cell: Cell, at: Place) -> Text:
 def _draw_wire(axes: Axes, weight: float, source: Text, target: Text) -> None:
     """Draw a straight arrow to the right; a bow backwards or to the cell itself."""
     (x, y), (to_x, to_y) = start, end = source.get_position(), target.get_position()
-    arrow: dict[str, Any] = {
+    arrow: dict[str, object] = {
         "arrowstyle": "->",
         "color": MIDDLE,
         "linestyle": "--" if weight < 0 else "-",

@@ -6,7 +6,6 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -18,6 +17,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from mjxgait.certification.stress import Stress
 from mjxgait.files import replaced
+from mjxgait.training.folder import Line
 
 matplotlib.use("Agg")
 
@@ -65,7 +65,7 @@ def save(drawing: Figure, path: Path, formats: Sequence[str] = FORMATS) -> list[
     return files
 
 
-Lines = Sequence[Mapping[str, Any]]
+Lines = Sequence[Line]
 MAIN_TERMS = 7
 """Terms drawn one by one; the others are summed."""
 GREYS = ("0.25", "0.62", "0.82", "0.45", "0.92", "0.72", "0.35", "0.98")

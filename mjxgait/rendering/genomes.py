@@ -6,7 +6,6 @@ In a tree, leaves stand side by side, each parent in the middle of its children.
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +13,7 @@ from matplotlib.figure import Figure
 
 from mjxgait.champion import Champion
 from mjxgait.controllers.expressions.text import ADDED, Expression, nested, terminals
+from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.reference_body import Part, grow
 from mjxgait.creature import Creature
 from mjxgait.inspect.snapshot import Snapshot, read_snapshot
@@ -145,7 +145,7 @@ ALONG = (0.6, 0.45, 0.3)
 def draw_graph(drawing: Figure, walk: Walk) -> None:
     """Draw the nodes and connections that grow, and the body."""
     graph, body = drawing.subplots(1, 2)
-    settings: Any = walk.champion.settings
+    settings: BrainConfig = walk.champion.settings
     genome = walk.champion.genome
     _draw_graph(graph, genome, grow(genome, settings.parts, settings.links))
     body.imshow(Stage([walk], *SIZE).picture(0), interpolation="lanczos")

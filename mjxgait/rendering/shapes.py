@@ -3,12 +3,15 @@
 Letters: `N` rays, `G` geoms, `K` directions.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
 from mjxgait.creature.geometry import support_extents
+
+if TYPE_CHECKING:
+    from mjxgait.rendering.painter import _Canvas, _Paint
 
 GEOM = mujoco.mjtGeom
 MISS = np.inf
@@ -136,7 +139,12 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def fill_mesh(
-    canvas: Any, model: mujoco.MjModel, geom: int, pos: np.ndarray, rot: np.ndarray, paint: Any
+    canvas: "_Canvas",
+    model: mujoco.MjModel,
+    geom: int,
+    pos: np.ndarray,
+    rot: np.ndarray,
+    paint: "_Paint",
 ) -> None:
     """Draw a mesh geom at pos [3] m and rot [3, 3] on a painter's canvas."""
     points, faces = mesh_of(model, geom)
@@ -159,7 +167,9 @@ def mesh_of(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray]:
     ]
 
 
-def _fill(canvas: Any, flat: np.ndarray, depth: np.ndarray, normal: np.ndarray, paint: Any) -> None:
+def _fill(
+    canvas: "_Canvas", flat: np.ndarray, depth: np.ndarray, normal: np.ndarray, paint: "_Paint"
+) -> None:
     """Fill one triangle. flat: [3, 2] pixels. depth: [3] m."""
     x0, y0 = np.maximum(np.floor(flat.min(0)).astype(int), 0)
     x1, y1 = np.minimum(

@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -179,7 +179,7 @@ def _write_mp4(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
         container.mux(stream.encode())
 
 
-def _import_av(path: Path) -> Any:
+def _import_av(path: Path) -> ModuleType:
     try:
         import av
     except ImportError:

@@ -17,6 +17,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
 from pathlib import Path
+from socket import socket
 from typing import Any
 
 import numpy as np
@@ -83,7 +84,7 @@ class Watcher:
         while not ended():
             time.sleep(self.look())
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> dict[str, object]:
         """Return the state that the page requests every second."""
         what = self.shown.what
         try:
@@ -150,6 +151,10 @@ def _shut_after(server: ThreadingHTTPServer, wait: Callable[[], object]) -> None
     server.shutdown()
 
 
+Request = socket | tuple[bytes, socket]
+"""As `socketserver` has it; the second form is UDP's."""
+
+
 class _Server(ThreadingHTTPServer):
     """A server with at most `CONNECTIONS` connections; it closes any further one at once."""
 
@@ -159,21 +164,21 @@ class _Server(ThreadingHTTPServer):
         self._free = threading.BoundedSemaphore(CONNECTIONS)
         super().__init__(*given)
 
-    def process_request(self, request: Any, client_address: Any) -> None:
+    def process_request(self, request: Request, client_address: object) -> None:
         """Answer in a new thread if one is free."""
         if self._free.acquire(blocking=False):
             super().process_request(request, client_address)
         else:
             self.shutdown_request(request)
 
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
+    def process_request_thread(self, request: Request, client_address: object) -> None:
         """Answer, and release the thread."""
         try:
             super().process_request_thread(request, client_address)
         finally:
             self._free.release()
 
-    def handle_error(self, request: Any, client_address: Any) -> None:
+    def handle_error(self, request: Request, client_address: object) -> None:
         """Ignore a browser that disconnected or timed out."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
@@ -238,5 +243,5 @@ class _Handler(BaseHTTPRequestHandler):
         with contextlib.suppress(ConnectionError, TimeoutError):
             self.wfile.write(content)
 
-    def log_message(self, format: str, *args: Any) -> None:
+    def log_message(self, format: str, *args: object) -> None:
         """Log nothing."""

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 from mjxgait import files
 from mjxgait.animation.export import WalkLoop, build_driven, build_glb, walk_loop
@@ -220,7 +219,7 @@ KEPT = ("name", "speed", "turn", "duration")
 
 
 def driven_page(
-    loops: Mapping[str, WalkLoop], clips: Sequence[Mapping[str, Any]], of: int, blends: str
+    loops: Mapping[str, WalkLoop], clips: Sequence[Mapping[str, object]], of: int, blends: str
 ) -> str:
     """Return the text of the page.
 

@@ -5,7 +5,7 @@ Y is up, forward +Z, lengths are m. Needs the extra `[usd]`.
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from mjxgait.animation.export.skeleton import (
 from mjxgait.animation.export.surface import Piece, along_limbs, linear, pieces_of
 from mjxgait.config.layers import install_command
 from mjxgait.errors import UserError
+
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd
 
 
 def export_usd(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
@@ -57,8 +60,8 @@ def export_usd(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
 
 
 def _add_skeleton(
-    stage: Any, root: Any, loop: WalkLoop, skeleton: Skeleton, travelling: bool
-) -> Any:
+    stage: "Usd.Stage", root: "Sdf.Path", loop: WalkLoop, skeleton: Skeleton, travelling: bool
+) -> "Sdf.Path":
     """Add the joints with their rest and their motion; return the skeleton's path."""
     from pxr import UsdSkel, Vt
 
@@ -90,7 +93,7 @@ def _add_skeleton(
     return bones.GetPath()
 
 
-def _add_piece(stage: Any, root: Any, piece: Piece, skeleton: Any) -> None:
+def _add_piece(stage: "Usd.Stage", root: "Sdf.Path", piece: Piece, skeleton: "Sdf.Path") -> None:
     """Add a mesh of one colour, bound to the skeleton."""
     from pxr import UsdGeom, UsdSkel, Vt
 

@@ -5,9 +5,8 @@ Letters: `N` samples of a cycle, `J` joints, `F` feet.
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,7 +15,7 @@ from mjxgait.animation.keys.bring import Brought
 from mjxgait.animation.keys.cycle import interpolated
 from mjxgait.certification import criteria_of, judged, read_certificate
 from mjxgait.config.schema import Config
-from mjxgait.config.tables import build, merge
+from mjxgait.config.tables import Table, build, merge
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.files import read_json, write_text
@@ -65,7 +64,7 @@ def base_settings(
     seed: int,
     population: int | None = None,
     generations: int | None = None,
-    others: Mapping[str, Any] | None = None,
+    others: Table | None = None,
 ) -> Config:
     """The settings of a training with key poses, before the cycle is known.
 
@@ -97,7 +96,7 @@ def refining(config: Config, brought: Brought, keep: float) -> Config:
         raise UserError(f"--keep {keep:g}: must lie between 0 and 1")
     poses, period = brought.fit.key_poses, brought.cycle.period
     slack = SLOWER * (1.0 - keep)
-    near: dict[str, Any] = {
+    near: dict[str, object] = {
         "key_poses": len(poses),
         "mirror": brought.cycle.mirrored,
         "advance": "clock",

@@ -9,7 +9,6 @@ import dataclasses
 import difflib
 import re
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -50,7 +49,7 @@ SAME = {
 
 
 def matched(
-    wanted: Iterable[str], found: Iterable[str], table: Mapping[str, Any] | None, where: str
+    wanted: Iterable[str], found: Iterable[str], table: Mapping[str, object] | None, where: str
 ) -> dict[str, str]:
     """Name in the file by wanted name, for those with a match.
 

@@ -6,8 +6,10 @@ one creature ([] and [n]) and lanes innermost ([L] and [n, L]). Kinds of ground:
 docs/reference/ground.md.
 """
 
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from typing_extensions import override
@@ -23,12 +25,13 @@ LENGTHS = {"bumps": (2.0, 2.0), "rough": (1.5, 2.0, 2.7, 3.6, 4.8)}
 """Length of each wave in hip heights."""
 DRAWS = max(len(lengths) for lengths in LENGTHS.values())
 """Pairs of random numbers that a ground of any kind takes."""
+Vector = tuple[jax.Array, jax.Array, jax.Array]
 
 
 class Relief(Protocol):
     """Heights by the place ahead and to the left of the start, in m."""
 
-    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+    def rise(self, ahead: jax.Array, left: jax.Array, level: jax.Array) -> Vector:
         """Height in m, and its change per metre ahead and to the left.
 
         level: m, radius around the start that is level.
@@ -40,20 +43,20 @@ class Relief(Protocol):
 class Ground:
     """One trial's ground. start: [2] m. forward: [2]. level: [] m, see `Relief`."""
 
-    start: Number
-    forward: Number
-    level: Number
-    relief: Any
+    start: jax.Array
+    forward: jax.Array
+    level: jax.Array
+    relief: Relief
 
 
 @pytree
 class Slope(Relief):
     """A slope. along, across: [] rise per metre ahead and to the left."""
 
-    along: Number
-    across: Number
+    along: jax.Array
+    across: jax.Array
 
-    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+    def rise(self, ahead: jax.Array, left: jax.Array, level: jax.Array) -> Vector:
         """See `Relief`; a slope along the way begins as a parabola a `level` long."""
         beyond = ahead - level
         bend = jnp.clip(beyond, 0.0, level)
@@ -71,12 +74,12 @@ class Slope(Relief):
 class Steps(Relief):
     """Stairs. height, tread: [] m of a step. offset: [] share of a tread before the first."""
 
-    height: Number
-    tread: Number
-    offset: Number
+    height: jax.Array
+    tread: jax.Array
+    offset: jax.Array
 
     @override
-    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+    def rise(self, ahead: jax.Array, left: jax.Array, level: jax.Array) -> Vector:
         treads = jnp.maximum((ahead - level) / self.tread - self.offset, 0.0)
         whole = jnp.floor(treads)
         up = jnp.clip((treads - whole - (1 - RISER)) / RISER, 0.0, 1.0)
@@ -89,13 +92,13 @@ class Steps(Relief):
 class Waves(Relief):
     """Plane waves. size: [W] m. along, across: [W] cycles per metre. phase: [W] cycles."""
 
-    size: Number
-    along: Number
-    across: Number
-    phase: Number
+    size: jax.Array
+    along: jax.Array
+    across: jax.Array
+    phase: jax.Array
 
     @override
-    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+    def rise(self, ahead: jax.Array, left: jax.Array, level: jax.Array) -> Vector:
         height = by_ahead = by_left = jnp.zeros_like(ahead)
         for w in range(self.size.shape[0]):
             cycles = self.along[w] * ahead + self.across[w] * left + self.phase[w]
@@ -121,13 +124,13 @@ class Together(Relief):
     waves: Waves
 
     @override
-    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+    def rise(self, ahead: jax.Array, left: jax.Array, level: jax.Array) -> Vector:
         height, by_ahead, by_left = self.slope.rise(ahead, left, level)
         more, more_ahead, more_left = self.waves.rise(ahead, left, level)
         return height + more, by_ahead + more_ahead, by_left + more_left
 
 
-def _full(ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+def _full(ahead: jax.Array, left: jax.Array, level: jax.Array) -> Vector:
     """Share of the full height, and its changes per metre.
 
     0 within `level` of the start, 1 from twice as far on.
@@ -138,7 +141,7 @@ def _full(ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
     return share * share * (3 - 2 * share), change * ahead, change * left
 
 
-def lay_ground(spec: GroundSpec, place: Place, draws: Any) -> Ground | None:
+def lay_ground(spec: GroundSpec, place: Place, draws: Number) -> Ground | None:
     """The ground of a spec under a creature; None where it is flat.
 
     draws: [DRAWS, 2] in [0, 1): direction and phase of each wave, see `named_draws`.
@@ -159,7 +162,9 @@ def lay_ground(spec: GroundSpec, place: Place, draws: Any) -> Ground | None:
     return _laid(place, relief)
 
 
-def lay_uneven(place: Place, slope: Any, rough: float, draws: Any) -> Ground:
+def lay_uneven(
+    place: Place, slope: Number | Sequence[float], rough: float, draws: Number
+) -> Ground:
     """Rough ground on a slope to any side.
 
     slope: [2] rise per metre ahead and to the left. rough: hip heights, the most that the waves
@@ -178,7 +183,7 @@ def _laid(place: Place, relief: Relief) -> Ground:
     )
 
 
-def _waves(spec: GroundSpec, hip: float, draws: Any) -> Waves:
+def _waves(spec: GroundSpec, hip: float, draws: Number) -> Waves:
     """Waves of equal steepness. Rough ground draws their directions, bumps lie crosswise."""
     lengths = np.array(LENGTHS[spec.kind]) * hip
     count = len(lengths)
@@ -197,17 +202,19 @@ def named_draws(seed: int) -> np.ndarray:
     return np.random.RandomState(seed).random_sample((DRAWS, 2))
 
 
-def height(ground: Ground, x: Any, y: Any) -> Any:
+def height(ground: Ground, x: jax.Array, y: jax.Array) -> jax.Array:
     """Height in m at places in m."""
     return _surface(ground, x, y)[0]
 
 
-def normal(ground: Ground, x: Any, y: Any) -> tuple[Any, Any, Any]:
+def normal(ground: Ground, x: jax.Array, y: jax.Array) -> Vector:
     """Unit vector out of the ground at places in m: three components."""
     return _normal(*_surface(ground, x, y)[1:])
 
 
-def clearance(ground: Ground, x: Any, y: Any, z: Any, radius: Any) -> Any:
+def clearance(
+    ground: Ground, x: jax.Array, y: jax.Array, z: jax.Array, radius: Number
+) -> jax.Array:
     """Distance in m of spheres at these centres to the ground's tangent plane below the centre."""
     below, by_x, by_y = _surface(ground, x, y)
     return (z - below) * _normal(by_x, by_y)[2] - radius
@@ -216,13 +223,13 @@ def clearance(ground: Ground, x: Any, y: Any, z: Any, radius: Any) -> Any:
 class Contact(NamedTuple):
     """Contact of spheres with the ground: distance in m (negative inside), and its three axes."""
 
-    distance: Any
-    normal: tuple[Any, Any, Any]
-    first: tuple[Any, Any, Any]
-    second: tuple[Any, Any, Any]
+    distance: jax.Array
+    normal: Vector
+    first: Vector
+    second: Vector
 
 
-def contact(ground: Ground, x: Any, y: Any, z: Any, radius: Any) -> Contact:
+def contact(ground: Ground, x: jax.Array, y: jax.Array, z: jax.Array, radius: Number) -> Contact:
     """Contact of spheres at these centres with the ground's tangent plane nearest to them.
 
     Two evaluations find that plane: below the centre, and at the foot of the perpendicular on the
@@ -242,12 +249,12 @@ def contact(ground: Ground, x: Any, y: Any, z: Any, radius: Any) -> Contact:
     return Contact(distance, (nx, ny, nz), first, second)
 
 
-def _normal(by_x: Any, by_y: Any) -> tuple[Any, Any, Any]:
+def _normal(by_x: jax.Array, by_y: jax.Array) -> Vector:
     up = 1 / jnp.sqrt(1 + by_x * by_x + by_y * by_y)
     return -by_x * up, -by_y * up, up
 
 
-def _surface(ground: Ground, x: Any, y: Any) -> tuple[Any, Any, Any]:
+def _surface(ground: Ground, x: jax.Array, y: jax.Array) -> Vector:
     """Height in m, and its change per metre along the world's x and y."""
     east, north = x - ground.start[0], y - ground.start[1]
     cos, sin = ground.forward[0], ground.forward[1]

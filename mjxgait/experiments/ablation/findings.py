@@ -7,10 +7,9 @@ fixed seed: equal values give equal numbers.
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -20,6 +19,7 @@ from mjxgait.experiments.ablation.plan import Plan
 from mjxgait.experiments.ablation.rows import Result
 from mjxgait.files import replaced
 from mjxgait.rendering.curves import ACCENT, DARK, figure
+from mjxgait.training.folder import Line
 
 RESAMPLES = 9999
 TRIM = 0.25
@@ -225,7 +225,7 @@ def draw_intervals(findings: Sequence[Finding], measure: str, path: Path) -> Non
             drawing.savefig(beside, metadata={"Software": None})
 
 
-def draw_curves(plan: Plan, logs: Sequence[Mapping[str, Any]], path: Path) -> None:
+def draw_curves(plan: Plan, logs: Sequence[Line], path: Path) -> None:
     """Draw each variant's best fitness: interquartile mean and middle half of the runs.
 
     A run without a finite best fitness counts as the worst.

@@ -15,6 +15,7 @@ from mjxgait.config.tables import (
     STRICT,
     Count,
     Finite,
+    Table,
     Whole,
     build,
     merge,
@@ -89,7 +90,7 @@ class Study:
     physics: Physics | None = None
     base: dict[str, Any] = dataclasses.field(default_factory=dict)
     variant: tuple[VariantTable, ...] = ()
-    grid: dict[str, tuple[Any, ...]] = dataclasses.field(default_factory=dict)
+    grid: dict[str, tuple[object, ...]] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if bool(self.variant) == bool(self.grid):
@@ -129,7 +130,7 @@ class Plan:
         return sum(_most_steps(run, creature) for run in self.runs)
 
 
-def read_study(file: Path, over: Mapping[str, Any]) -> Study:
+def read_study(file: Path, over: Mapping[str, object]) -> Study:
     """Return the study in a file or shipped under this name, with options laid over it.
 
     If `generations` changes, variants with their own number keep their share of evaluations, which
@@ -247,7 +248,7 @@ def _settled(config: Config, generations: int) -> Config:
     return dataclasses.replace(config, evolution=evolution)
 
 
-def _lay(config: Config, table: Mapping[str, Any], where: str) -> Config:
+def _lay(config: Config, table: Table, where: str) -> Config:
     if "seed" in table or "generations" in table.get("evolution", {}):
         raise UserError(
             f"{where}: seeds and generations are the study's own keys, not settings of a variant"
@@ -279,7 +280,7 @@ def _grid(study: Study, where: str) -> list[VariantTable]:
     return rows
 
 
-def _nested(key: str, value: Any) -> dict[str, Any]:
+def _nested(key: str, value: object) -> dict[str, object]:
     first, _, rest = key.partition(".")
     return {first: _nested(rest, value) if rest else value}
 

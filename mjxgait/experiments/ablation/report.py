@@ -6,9 +6,8 @@ import dataclasses
 import html
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow
@@ -28,6 +27,7 @@ from mjxgait.experiments.ablation.findings import (
 from mjxgait.experiments.ablation.plan import Plan
 from mjxgait.experiments.ablation.rows import Result
 from mjxgait.files import replaced, write_text
+from mjxgait.training.folder import Line
 from mjxgait.training.stored import disk_errors
 
 NAMES = {
@@ -53,7 +53,7 @@ def write_report(
     folder: Path,
     plan: Plan,
     results: Sequence[Result],
-    logs: Sequence[Mapping[str, Any]],
+    logs: Sequence[Line],
     command: str,
 ) -> Path:
     """Write report.md, report.html, results.csv, generations.parquet and the pictures.
@@ -226,7 +226,7 @@ def _csv(results: Sequence[Result]) -> str:
     return text.getvalue()
 
 
-def _cell(value: Any) -> Any:
+def _cell(value: object) -> object:
     """Return a CSV value; text that a spreadsheet would read as a formula gets a leading quote."""
     formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
     return f"'{value}" if formula else value

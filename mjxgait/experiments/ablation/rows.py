@@ -8,10 +8,10 @@ import dataclasses
 import functools
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, TypedDict, cast
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from mjxgait.training.checkpoint import Checkpoints, Packed
 from mjxgait.training.folder import (
     CREATURE,
     METRICS,
+    Line,
     read_metrics,
     read_records,
     truncate_metrics,
@@ -41,15 +42,34 @@ from mjxgait.training.folder import (
 from mjxgait.training.loop import interruptible
 from mjxgait.training.stored import disk_errors, is_number
 
+if TYPE_CHECKING:
+    from jax.tree_util import PyTreeDef
+
 GROUPS, CHAMPIONS = "groups", "champions"
 
-Progress = Callable[[int, int, dict[str, Any]], None]
+
+class News(TypedDict, total=False):
+    """Progress of a group: `compiling` runs side by side, or all the rest.
+
+    generation, of: reached, and the last. generations, seconds, steps: of what was just done.
+    """
+
+    compiling: int
+    generation: int
+    of: int
+    generations: int
+    seconds: float
+    steps: int
+    note: str
+
+
+Progress = Callable[[int, int, News], None]
 """Callback with the group, the number of groups and the progress to report."""
 
 
 def groups(plan: Plan) -> list[list[Run]]:
     """Return the runs that share a program, side by side, in the plan's order."""
-    found: dict[Any, list[Run]] = {}
+    found: dict[PyTreeDef, list[Run]] = {}
     for run in plan.runs:
         found.setdefault(traced_structure(run.config), []).append(run)
     most = plan.study.rows or len(plan.runs)
@@ -124,7 +144,7 @@ class _Group:
         """Generation that the rows have reached; -1 before the first."""
         return -1 if self.state is None else self.state.generation
 
-    def work(self, tell: Callable[[dict[str, Any]], None] | None = None) -> tuple[Recipe, Job]:
+    def work(self, tell: Callable[[News], None] | None = None) -> tuple[Recipe, Job]:
         """Return the next job. tell: only on the first call, which makes the folder."""
         if tell:
             self._begin()
@@ -144,7 +164,7 @@ class _Group:
         self.state = advanced.packed
         self.checkpoints.keep(self.state, self.creature.name, self.creature.digest)
 
-    def news(self, advanced: Advanced) -> dict[str, Any]:
+    def news(self, advanced: Advanced) -> News:
         """Return the progress to report."""
         return {
             "generation": self.generation,
@@ -170,7 +190,7 @@ class _Group:
             self.state = self.checkpoints.read(self.creature.digest)
         truncate_metrics(self.folder / METRICS, self.generation)
 
-    def _log(self, lines: list[dict[str, Any]]) -> None:
+    def _log(self, lines: Sequence[Line]) -> None:
         """Append one line per run that has not ended.
 
         Wall time is left out: the rows share it, and it is never the same twice.
@@ -235,7 +255,7 @@ class Result:
         return dataclasses.replace(self, walk=walk, up=up, certified=None)
 
 
-def read_logs(folder: Path) -> list[dict[str, Any]]:
+def read_logs(folder: Path) -> list[Line]:
     """Return every generation of every run that a study has logged so far."""
     found = (folder / GROUPS).glob(f"*/{METRICS}")
     known = [file for file in found if is_number(file.parent.name)]
@@ -256,7 +276,7 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
         with disk_errors(folder):
             write_lines(folder / MEASURED, measured)
     known = {(line["variant"], line["seed"]): Result(**line) for line in measured}
-    lines: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    lines: dict[tuple[str, int], list[Line]] = {}
     for line in read_logs(folder):
         lines.setdefault((line["variant"], line["seed"]), []).append(line)
     missing = [run for run in plan.runs if (run.variant, run.seed) not in known]
@@ -279,11 +299,11 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
     return [known[run.variant, run.seed] for run in plan.runs]
 
 
-def _measured(folder: Path) -> list[dict[str, Any]]:
+def _measured(folder: Path) -> list[Line]:
     return read_records(folder / MEASURED, Result)
 
 
-def _result(study: Study, run: Run, lines: Sequence[Mapping[str, Any]], judged: Judged) -> Result:
+def _result(study: Study, run: Run, lines: Sequence[Line], judged: Judged) -> Result:
     ways, certified = judged
     walk, up = ways[study.grounds[0]]
     best = [-math.inf if line["best"] is None else line["best"] for line in lines]
@@ -304,7 +324,7 @@ def _result(study: Study, run: Run, lines: Sequence[Mapping[str, Any]], judged: 
     )
 
 
-def _found_somebody(lines: Sequence[Mapping[str, Any]]) -> bool:
+def _found_somebody(lines: Sequence[Line]) -> bool:
     """Return whether the best fitness at the end is finite."""
     return lines[-1]["best"] is not None
 

@@ -69,7 +69,7 @@ class Transition:
         return self.loop is not None
 
     @property
-    def entry(self) -> dict[str, Any]:
+    def entry(self) -> dict[str, object]:
         """Entry of the table."""
         ends = {"name": self.name, "from": self.begins, "to": self.ends}
         if self.loop is None or self.loop.path is None:
@@ -245,10 +245,10 @@ def table_of(
     }
 
 
-def _entry(name: str, loop: WalkLoop, one: Found | None) -> dict[str, Any]:
+def _entry(name: str, loop: WalkLoop, one: Found | None) -> dict[str, object]:
     """Return a clip's entry. speed, turn: measured, for blending; asked: the cell's targets."""
     duration = float(loop.times[-1])
-    entry: dict[str, Any] = {
+    entry: dict[str, object] = {
         "name": name,
         "speed": round(loop.speed, 4),
         "turn": round(float(np.degrees(loop.turned)) / duration, 3),

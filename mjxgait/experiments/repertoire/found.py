@@ -3,7 +3,6 @@
 import dataclasses
 import textwrap
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +11,7 @@ from matplotlib.patches import Rectangle
 from rich.table import Table
 
 from mjxgait.certification import judged, read_certificate
+from mjxgait.certification.verdict import Document
 from mjxgait.experiments.repertoire.grid import Cell, Grid
 from mjxgait.rendering.curves import DARK, MIDDLE, PALE
 from mjxgait.training.folder import CERTIFICATE
@@ -99,7 +99,7 @@ def _field(axes: Axes, one: Found, x: float, y: float) -> None:
     )
 
 
-def _found(cell: Cell, document: dict[str, Any] | None) -> Found:
+def _found(cell: Cell, document: Document | None) -> Found:
     if document is None:
         return Found(cell, False, None, None, None, "", None, ())
     report, verdict = document.get("report", {}), judged(document)

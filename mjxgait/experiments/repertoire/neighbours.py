@@ -7,14 +7,15 @@ Letters: `S` moments at which the change is commanded, `T` control steps.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from mjxgait.certification import CertificateConfig, nominal_check
+from mjxgait.certification.acceptance import Wish
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -80,7 +81,7 @@ class Blend:
         return not self.fails
 
     @property
-    def entry(self) -> dict[str, Any]:
+    def entry(self) -> dict[str, object]:
         """Entry of the table."""
         names = [cell.name for cell in self.between]
         return {"between": names, "walks": self.walks, "fails": list(self.fails)}
@@ -128,7 +129,7 @@ def _cycle(champion: Champion, creature: Creature) -> np.ndarray:
     return np.concatenate([poses, mirrored(poses, creature)])
 
 
-def _between(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+def _between(one: Wish, other: Wish) -> dict[str, object]:
     turn = (one.get("turn", 0.0) + other.get("turn", 0.0)) / 2
     speed = (one["speed"] + other["speed"]) / 2
     told = {name: value for name, value in one.items() if name not in ("turn", "steer")}
@@ -150,7 +151,7 @@ class Change:
     share: float
 
     @property
-    def entry(self) -> dict[str, Any]:
+    def entry(self) -> dict[str, object]:
         """Entry of the table."""
         return {
             "from": self.begins.name,
