@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -28,10 +29,14 @@ from mjxgait.controllers.key_poses.config import (
     gene_names,
 )
 from mjxgait.creature import Creature
+from mjxgait.simulation.evaluator import completed
 from mjxgait.tasks.base import in_order
+from mjxgait.tasks.starts import Starts
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import signed_weights, terms_under
+from mjxgait.training.blueprint import Plan
 from mjxgait.training.experiment import Batch
+from mjxgait.types import Asked, Judged
 
 STOOL = Path(__file__).parent / "data" / "stool"
 
@@ -159,3 +164,32 @@ class Shares:
 
     def margin(self, share: float) -> float:
         return share - 0.9
+
+
+def made_up_judge(
+    blueprint: Plan,
+    numbers: object,
+    settings: Config,
+    starts: Starts,
+    genomes: Any,
+    asked: Asked | None = None,
+) -> Judged:
+    """In place of `training.stages.judge`: a generation that simulates nothing and compiles soon.
+
+    Key poses in the middle are the best, the higher the weight of speed the more; poses that are not
+    numbers have no value.
+    """
+    task, poses = blueprint.own.task, genomes.key_poses
+    shape = (*poses.shape[:2], starts.friction.shape[1])
+    worth = -jnp.asarray(settings.fitness.speed)[:, None] * jnp.square(poses).sum((2, 3))
+    worth = worth[..., None, None] * starts.friction[:, None, :, None]
+    wanted = jnp.ones(shape, bool) if asked is None else jnp.asarray(asked.wanted)
+    lived = jnp.sum(wanted, axis=(1, 2), dtype=jnp.int32)
+    judged = Judged(
+        terms=jnp.tile(worth, len(task.terms)),
+        outcome=jnp.tile(worth, len(task.outcomes)),
+        failed=~jnp.isfinite(worth[..., 0]),
+        sim_steps=lived,
+        computed_steps=lived,
+    )
+    return judged if asked is None else completed(judged, asked)

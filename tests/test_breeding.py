@@ -19,8 +19,8 @@ from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, first_occurrence
 
 THESIS = EvolutionConfig(
-    population=12,
-    growth=4.0,
+    population=4,
+    growth=6.0,
     selection="uniform",
     crossover=1.0,
     crossing="permute",
@@ -47,19 +47,24 @@ def bear(
     return Nursery(settings, pose_variation(box, settings)).children(key, adults)
 
 
-def born(poses: int = 3, seed: int = 0, **settings) -> tuple[Genome, Genome, jax.Array]:
-    """The adults, their children, and which of these are crossings."""
+POSES = 3
+
+
+def born(alike: bool = False, **settings) -> tuple[Genome, Genome, jax.Array]:
+    """The adults, their children, and which of these are crossings; `alike`: of copies of one."""
     config = dataclasses.replace(THESIS, **settings)
-    adults = marked(config, poses)
-    reach = float(config.population * poses)
+    adults = marked(config, POSES)
+    if alike:
+        adults = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf[:1], leaf.shape), adults)
+    reach = float(config.population * POSES)
     settings = traced(Config(evolution=config)).evolution
-    children, crossed = bear(settings, key_of(seed), adults, jnp.float32(reach))
+    children, crossed = bear(settings, key_of(0), adults, jnp.float32(reach))
     return adults, children, crossed
 
 
-def ancestors(children: Genome, poses: int = 3) -> list[int]:
+def ancestors(children: Genome) -> list[int]:
     """From how many adults each child has its poses."""
-    whose = np.asarray(children.key_poses[..., 0]).astype(int) // poses
+    whose = np.asarray(children.key_poses[..., 0]).astype(int) // POSES
     return [len(set(row)) for row in whose]
 
 
@@ -82,21 +87,25 @@ def test_otherwise_parents_are_adults():
 
 @pytest.mark.parametrize("pool", ["parents", "growing"])
 def test_no_child_is_like_an_adult_or_a_sibling(pool: str):
-    """Two adults of two poses have ten children that are not themselves; eight are asked for."""
-    adults, children, _ = born(2, population=2, growth=5.0, pool=pool)
+    """Four adults of three poses, each in its place, have 36 children of two that are not themselves;
+    20 are asked for.
+    """
+    adults, children, crossed = born(pool=pool, crossing="align")
+    assert crossed.sum() > 10
     assert first_occurrence(together(adults, children)).all()
 
 
 def test_without_that_there_are_copies():
-    adults, children, _ = born(2, population=2, growth=5.0, unique_children=False)
+    adults, children, _ = born(crossing="align", unique_children=False)
     assert not first_occurrence(together(adults, children)).all()
 
 
 def test_where_no_child_would_be_new_it_is_a_mutant():
-    """Two adults of one pose can only have themselves again."""
-    adults, children, crossed = born(1, population=2, growth=3.0, pool="parents")
+    """Adults that are copies of one, each pose in its place, can only have it again."""
+    adults, children, crossed = born(alike=True, crossing="align", pool="parents")
     assert not crossed.any()
-    assert first_occurrence(together(adults, children)).all()
+    one = jax.tree.map(lambda leaf: leaf[:1], adults)
+    assert first_occurrence(together(one, children)).all()
 
 
 def test_children_of_one_parent_are_its_mutants():

@@ -208,37 +208,43 @@ from mjxgait.evolution.chance import key_of
 
 begun = begin(*inputs(toy()), key_of(0))
 state, later = (dataclasses.replace(begun, generation=jax.numpy.int32(g)) for g in (0, 1))
-checkpoints = checkpoint.Checkpoints(Path(sys.argv[1]))
-checkpoints.save(state, "toy", "0" * 16)
-checkpoints.wait()
-if sys.argv[2] == "after the trial":
-    checkpoint.try_room = lambda *_: None
-resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
-said = []
-for write in (lambda: checkpoints.save(later, "toy", "0" * 16), checkpoints.close):
-    try:
-        write()
-    except UserError as error:
-        said.append(error)
-print(said[0])
+limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+for folder in sys.argv[1:]:
+    checkpoints = checkpoint.Checkpoints(Path(folder))
+    checkpoints.save(state, "toy", "0" * 16)
+    checkpoints.wait()
+    if folder.endswith("after the trial"):
+        checkpoint.try_room = lambda *_: None
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    said = []
+    for write in (lambda: checkpoints.save(later, "toy", "0" * 16), checkpoints.close):
+        try:
+            write()
+        except UserError as error:
+            said.append(error)
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    print(said[0], flush=True)
 """
 
 
-@pytest.mark.parametrize("moment", ["before", "after the trial"])
-def test_a_disk_that_fills_is_one_sentence_and_nothing_else_on_the_screen(
-    tmp_path: Path, moment: str
-):
-    """Files may not grow over 100 bytes, which stands for a full disk."""
+def test_a_disk_that_fills_is_one_sentence_and_nothing_else_on_the_screen(tmp_path: Path):
+    """Files may not grow over 100 bytes, which stands for a full disk.
+
+    It fills before room is tried, and after the trial.
+    """
+    folders = [tmp_path / moment for moment in ("before", "after the trial")]
     done = subprocess.run(
-        [sys.executable, "-c", FILLS, str(tmp_path), moment],
+        [sys.executable, "-c", FILLS, *map(str, folders)],
         capture_output=True,
         text=True,
         timeout=100,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "JAX_PLATFORMS": "cpu"},
     )
     assert done.stderr == ""
-    assert re.fullmatch(r".*File too large; .*make room and go on with --resume", done.stdout[:-1])
-    assert Checkpoints(tmp_path).generations() == [0]
+    sentences = done.stdout.splitlines()
+    for folder, sentence in zip(folders, sentences, strict=True):
+        assert re.fullmatch(r".*File too large; .*make room and go on with --resume", sentence)
+        assert Checkpoints(folder).generations() == [0]
 
 
 def test_a_state_is_a_pytree_that_holds_everything(states: list[EvolutionState]):

@@ -78,17 +78,21 @@ def tensors(numbers: Any) -> np.ndarray:
     return whole / moments.max()
 
 
+LARGER = pytest.mark.thorough("luxo shows it on nested parts, and the stool on mirrored ones")
+
+
 @pytest.mark.parametrize(
     "shipped",
-    [pytest.param("crab", marks=pytest.mark.thorough("another body")), "duck"],
+    ["luxo", *(pytest.param(name, marks=LARGER) for name in ("crab", "duck"))],
     indirect=True,
 )
 def test_a_lanes_body_is_the_one_in_the_scaled_files(shipped: Creature):
     compare_with_the_scaled_files(shipped, fast_plant)
 
 
-def test_so_it_is_in_plain_mjx(stool: Creature):
-    compare_with_the_scaled_files(stool, mjx_plant)
+@pytest.mark.parametrize("make", [fast_plant, mjx_plant])
+def test_so_it_is_on_the_stool(stool: Creature, make: Any):
+    compare_with_the_scaled_files(stool, make)
 
 
 def compare_with_the_scaled_files(shipped: Creature, make: Any) -> None:
@@ -143,7 +147,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> mjxgait.Run:
     out = tmp_path_factory.mktemp("body") / "run"
     settings = {
         "evolution": {"body": MOST},
-        "rollout": {"seconds": 0.5, "lanes": 8},
+        "rollout": {"seconds": 0.5, "starts": 2, "promote": 1.0, "lanes": 8},
         "examination": {"candidates": 1, "every": 0, "draws": 1},
     }
     small = {"population": 8, "generations": 2, "settings": settings, "quiet": True}

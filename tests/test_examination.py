@@ -6,6 +6,7 @@ import io
 import json
 import shutil
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import STOOL, Shares, small_config
+from helpers import STOOL, Shares, made_up_judge, small_config
 from rich.console import Console
 
 from mjxgait.certification import (
@@ -28,7 +29,7 @@ from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.inspect.snapshot import read_snapshot
-from mjxgait.training import examination, loop
+from mjxgait.training import examination, loop, stages
 from mjxgait.training.examination import Examiner, Exams, due
 from mjxgait.training.examination import Validation as RunLooks
 from mjxgait.training.experiment import Experiment, build_experiment
@@ -410,6 +411,14 @@ def test_in_the_end_one_that_has_failed_before_is_not_chosen(experiment, looks, 
 def promising(monkeypatch: pytest.MonkeyPatch, looks: Looks) -> None:
     """Everybody is promising, so that the small run is looked at."""
     monkeypatch.setattr(examination, "_promising", lambda *_: True)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def made_up_verdicts() -> Iterator[None]:
+    """Runs evolve, but simulate as little as what looks at them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stages, "judge", made_up_judge)
+        yield
 
 
 def trained(folder: Path, experiment: Experiment, resume: bool = False) -> str:

@@ -20,8 +20,8 @@ from mjxgait.training.screen import Screen
 
 PAGE = Path(__file__).parents[1] / "docs" / "guide" / "your-own-task.md"
 SMALL = (
-    "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.lanes 4"
-    " --examination.candidates 0 --no-plots"
+    "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.starts 2"
+    " --rollout.promote 1 --rollout.lanes 4 --examination.candidates 0 --no-plots"
 )
 
 

@@ -75,6 +75,13 @@ def test_a_copy_lacks_what_is_made_and_nothing_else(tmp_path: Path):
         assert {n for n in (*kept, *left) if (tree / n).exists()} == set(kept)
 
 
+@pytest.fixture
+def few_plugins(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tests of a toy tree start pytest a dozen times, and need no more than `-n 0` does."""
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    monkeypatch.setenv("PYTEST_PLUGINS", "xdist.plugin")
+
+
 def planting(folder: Path, *faults: tuple[str, str, str, str]) -> list[str]:
     """The arguments with which the script plants these faults in a toy tree."""
     for name, text in TOY.items():
@@ -89,6 +96,7 @@ def planting(folder: Path, *faults: tuple[str, str, str, str]) -> list[str]:
     return ["--list", str(folder / "faults.toml"), "--root", str(folder / "tree")]
 
 
+@pytest.mark.usefixtures("few_plugins")
 def test_it_names_the_test_that_catches_a_fault(tmp_path: Path, capsys: pytest.CaptureFixture):
     assert script.main(planting(tmp_path, CAUGHT, BY_THE_REST)) == 0
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
@@ -97,14 +105,16 @@ def test_it_names_the_test_that_catches_a_fault(tmp_path: Path, capsys: pytest.C
     assert (tmp_path / "tree" / "toy.py").read_text() == TOY["toy.py"]
 
 
+@pytest.mark.usefixtures("few_plugins")
 def test_it_fails_when_nothing_catches_a_fault(tmp_path: Path, capsys: pytest.CaptureFixture):
-    assert script.main(planting(tmp_path, MISSED)) == 1
+    assert script.main([*planting(tmp_path, MISSED), "--trust"]) == 1
     assert "0 of 1 caught" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("few_plugins")
 def test_a_test_that_fails_anyway_has_caught_nothing(tmp_path: Path, capsys: pytest.CaptureFixture):
     """It is not named for a fault, so the first run without one leaves it out."""
-    arguments = planting(tmp_path, MISSED)
+    arguments = [*planting(tmp_path, MISSED), "--trust"]
     (tmp_path / "tree/tests/test_rest.py").write_text("def test_nothing():\n    assert False\n")
     assert script.main(arguments) == 1
     said = capsys.readouterr().out
@@ -125,6 +135,7 @@ def test_it_refuses_a_fault_whose_text_is_gone(tmp_path: Path):
         script.main(planting(tmp_path, ROTTEN))
 
 
+@pytest.mark.usefixtures("few_plugins")
 def test_it_refuses_to_begin_where_the_tests_fail_anyway(tmp_path: Path):
     arguments = planting(tmp_path, CAUGHT)
     (tmp_path / "tree" / "toy.py").write_text("def double(x):\n    return 2 * x + 1\n")

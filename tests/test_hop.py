@@ -17,6 +17,7 @@ from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.state import EvolutionState
 from mjxgait.plugins import resolve_config
 from mjxgait.plugins.registry import build_config
 from mjxgait.plugins.user_code import load
@@ -322,43 +323,6 @@ def test_style_grows_over_the_generations_and_the_goal_does_not():
 # Episodes
 
 
-@pytest.fixture(scope="module")
-def experiment(stool: Creature) -> Experiment:
-    table = {
-        "use": {"task": "hop"},
-        "evolution": {"population": 6},
-        "rollout": {"seconds": 0.4, "starts": 3, "promote": 1.0, "lanes": 4},
-    }
-    return build_experiment(stool, build_config(table, "test"))
-
-
-def test_every_episode_is_judged_by_its_own_goal(experiment: Experiment):
-    tally = jax.device_get(jax.jit(experiment.simulate)(experiment.init().genomes).tally)
-    goals = np.asarray(experiment.starts.goal)
-    assert len(set(goals.tolist())) == 3
-    np.testing.assert_array_equal(tally.goal, np.tile(goals, (6, 1)))
-    way = tally.goal - tally.left
-    # In a fifth of a second nobody gets far, and nobody stays where it was.
-    assert (np.abs(way) < 0.4).all()
-    assert np.abs(way).max() > 1e-3
-
-
-def test_evolution_weighs_energy_and_sub_goals_where_they_have_a_weight(stool: Creature):
-    table = {
-        "use": {"task": "hop"},
-        "evolution": {"population": 4},
-        "rollout": {"seconds": 0.2, "starts": 2, "promote": 1.0, "lanes": 4},
-        "fitness": {"weights": {"energy": 0.1, "sub_goals": 0.2}, "sub_goals": [0.1, 0.5]},
-    }
-    made = build_experiment(stool, build_config(table, "test"))
-    tally = jax.device_get(jax.jit(made.simulate)(made.init().genomes).tally)
-    assert (tally.work > 0).all()
-    # In a fifth of a second all are nearest to the first point, and near neither.
-    assert tally.closest.shape == (4, 2, 2)
-    assert (tally.closest[..., 0] < tally.closest[..., 1]).all()
-    assert (tally.closest[..., 0] > 0).all()
-
-
 REACH = """
 import jax.numpy as jnp
 from mjxgait.controllers.base import RealController
@@ -376,22 +340,53 @@ class Reach(RealController):
 ALIKE = {"joint_noise": 0.0, "velocity_noise": 0.0, "friction": (1.0, 1.0), "gains": 0.0, "push": 0}
 
 
-def reaching(stool: Creature, folder: Path, task: str, source: str = REACH) -> Experiment:
-    """Trials that differ in nothing but their goals, by a controller that does as it reads."""
-    (folder / "reach.py").write_text(source)
-    name = load("controller", f"{folder / 'reach.py'}:Reach")
+@pytest.fixture(scope="module")
+def experiment(stool: Creature, tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    """Trials that differ in nothing but their goals, by a controller that does as it reads; energy
+    and sub-goals have a weight.
+    """
+    file = tmp_path_factory.mktemp("reach") / "reach.py"
+    file.write_text(REACH)
     table = {
-        "use": {"task": task, "controller": name},
+        "use": {"task": "hop", "controller": load("controller", f"{file}:Reach")},
         "evolution": {"population": 6},
         "rollout": {"seconds": 0.4, "starts": 3, "promote": 1.0, "lanes": 4, **ALIKE},
+        "fitness": {"weights": {"energy": 0.1, "sub_goals": 0.2}, "sub_goals": [0.1, 0.5]},
     }
     return build_experiment(stool, build_config(table, "test"))
 
 
-def test_evolution_and_examiner_tell_a_controller_the_same_goals(stool: Creature, tmp_path: Path):
-    experiment = reaching(stool, tmp_path, "hop")
+@pytest.fixture(scope="module")
+def evaluated(experiment: Experiment) -> tuple[EvolutionState, Tally]:
+    """The first population, and the tally [6, 3] of its trials."""
     state = experiment.init()
-    tally = jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
+    return state, jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
+
+
+def test_every_episode_is_judged_by_its_own_goal(experiment: Experiment, evaluated):
+    _, tally = evaluated
+    goals = np.asarray(experiment.starts.goal)
+    assert len(set(goals.tolist())) == 3
+    np.testing.assert_array_equal(tally.goal, np.tile(goals, (6, 1)))
+    way = tally.goal - tally.left
+    # In two fifths of a second nobody gets far, and nobody stays where it was.
+    assert (np.abs(way) < 0.4).all()
+    assert np.abs(way).max() > 1e-3
+
+
+def test_evolution_weighs_energy_and_sub_goals_where_they_have_a_weight(evaluated):
+    _, tally = evaluated
+    assert (tally.work > 0).all()
+    # In two fifths of a second all are nearest to the first point, and near neither.
+    assert tally.closest.shape == (6, 3, 2)
+    assert (tally.closest[..., 0] < tally.closest[..., 1]).all()
+    assert (tally.closest[..., 0] > 0).all()
+
+
+def test_evolution_and_examiner_tell_a_controller_the_same_goals(
+    stool: Creature, experiment: Experiment, evaluated
+):
+    state, tally = evaluated
     starts = nominal_starts(stool, 3)
     starts.goal[:] = experiment.starts.goal
     # The first two touch the floor a step earlier in one precision than in the other.

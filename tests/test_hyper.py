@@ -3,19 +3,20 @@
 import dataclasses
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import STOOL, program_text, small_config
+from helpers import STOOL, made_up_judge, program_text, small_config
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.schema import Config
 from mjxgait.config.traced import chosen, traced
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
+from mjxgait.training import stages
 from mjxgait.training.experiment import Batch, Step, build_batch
 
 
@@ -87,7 +88,7 @@ def test_a_choice_is_known_plain_and_traced():
 VARIANTS = {
     "as it is": {},
     "another seed": {"seed": 5},
-    "plain PD": {"drive": {"law": "pd"}},
+    "plain PD, and slower": {"drive": {"law": "pd"}, "fitness": {"speed": 0.4}},
     "bit flips by the clock": {
         "controller": {"advance": "clock"},
         "evolution": {"mutation": "bit", "selection": "tournament"},
@@ -104,7 +105,7 @@ OTHERWISE = {
 """These at once, a weight and a push that others do not have."""
 
 
-def variant(tables: dict) -> Config:
+def variant(tables: dict, physics: str = "mjx") -> Config:
     """A config with the lanes of one that runs alone, so that rounding is the same, and of which half
     are tried in one start only.
 
@@ -112,42 +113,57 @@ def variant(tables: dict) -> Config:
     """
     tables = dict(tables)
     seed = tables.pop("seed", 0)
-    tables["rollout"] = {"physics": "mjx", "promote": 0.5} | tables.get("rollout", {})
+    tables["rollout"] = {"physics": physics, "promote": 0.5} | tables.get("rollout", {})
     return dataclasses.replace(small_config(**tables), seed=seed)
 
 
 @pytest.fixture(scope="module")
 def balls(tmp_path_factory: pytest.TempPathFactory) -> Creature:
-    """The front half of the stool, with balls for all shapes.
+    """The stool with one leg in its middle, a foot of it and a ball for its plate.
 
-    Plain MJX, with all optimizations, compiles sooner.
+    Its programs are short, and its plain MJX compiles sooner as users get it.
     """
     folder = shutil.copytree(STOOL, tmp_path_factory.mktemp("hyper") / "balls")
     xml = (folder / "creature.xml").read_text()
     xml = xml.replace('type="box" size="0.25 0.12 0.04"', 'type="sphere" size="0.1"')
-    xml = xml.replace('type="capsule" fromto="0 0 0 0 0 -0.24"', 'type="sphere" pos="0 0 -0.12"')
-    xml = re.sub(r'<body name="hind_.*?</body>', "", xml, flags=re.DOTALL)
-    (folder / "creature.xml").write_text(xml.replace("1 0 0 0 0 0 0 0", "1 0 0 0 0 0"))
+    xml = re.sub(r'<geom name="\w*_leg".*?/>', "", xml)
+    xml = xml.replace('"front_left" pos="0.2 0.12 0"', '"front_left" pos="0 0 0"')
+    xml = re.sub(r'<body name="(hind_|front_right).*?</body>', "", xml, flags=re.DOTALL)
+    (folder / "creature.xml").write_text(xml.replace("1 0 0 0 0 0 0 0", "1 0 0 0 0"))
     toml = (folder / "creature.toml").read_text()
-    toml = toml.replace(', "hind_left_foot", "hind_right_foot"', "")
+    toml = re.sub(r"feet = .*", 'feet = ["front_left_foot"]', toml)
     (folder / "creature.toml").write_text(toml)
     return load_creature(folder)
 
 
-@pytest.fixture(scope="module")
-def batch(balls: Creature) -> Batch:
-    return build_batch(balls, [variant(tables) for tables in VARIANTS.values()])
-
-
-@pytest.fixture(scope="module")
-def step(batch: Batch, emitted_as_shipped: None) -> Step:
-    return batch.compile()
-
-
-def test_one_program_serves_every_value(stool: Creature):
+def test_one_program_serves_every_value(balls: Creature):
     """Another seed, weight or mutation is found in the compilation cache: the program's text is the same."""
-    texts = [program_text(build_batch(stool, [variant(v)])) for v in ({}, OTHERWISE)]
+    texts = [
+        program_text(build_batch(balls, [variant(tables, physics="auto")]))
+        for tables in ({}, OTHERWISE)
+    ]
     assert texts[0] == texts[1]
+
+
+SIMULATED = pytest.mark.thorough(
+    "test_episode_parity simulates several rows, test_ablate compares one with its run"
+)
+
+
+@pytest.fixture(scope="module", params=["made up", pytest.param("simulated", marks=SIMULATED)])
+def batch(request: pytest.FixtureRequest, balls: Creature) -> Iterator[Batch]:
+    """Runs of which only evolution is compiled, and whole ones, as users get them."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "simulated":
+            request.getfixturevalue("emitted_as_shipped")
+        else:
+            patch.setattr(stages, "judge", made_up_judge)
+        yield build_batch(balls, [variant(tables) for tables in VARIANTS.values()])
+
+
+@pytest.fixture(scope="module")
+def step(batch: Batch) -> Step:
+    return batch.compile()
 
 
 def test_a_row_equals_the_run_that_runs_alone_to_the_bit(balls: Creature, batch: Batch, step: Step):
@@ -155,12 +171,12 @@ def test_a_row_equals_the_run_that_runs_alone_to_the_bit(balls: Creature, batch:
     for _ in range(3):
         states, metrics = step(states)
     # One program serves every value, so it is compiled once; the numbers of the body are in it.
-    stages = build_batch(balls, [variant({})]).stages()
+    compiled = build_batch(balls, [variant({})]).stages()
     for row, tables in enumerate(VARIANTS.values()):
-        alone = build_batch(balls, [variant(tables)])
-        rows, state = alone.place(alone.rows), alone.place(alone.init())
+        one = build_batch(balls, [variant(tables)])
+        rows, state = one.place(one.rows), one.place(one.init())
         for _ in range(3):
-            state, metrics_alone = stages.step(None, rows, state)
+            state, metrics_alone = compiled.step(None, rows, state)
         assert np.array_equal(state.fitness[0], states.fitness[row])
         assert np.array_equal(state.genomes.key_poses[0], states.genomes.key_poses[row])
         assert float(metrics_alone.best[0]) == float(metrics.best[row])

@@ -44,6 +44,7 @@ from mjxgait.types import Sensed
 
 CONFIG, DEMANDS = CertificateConfig(), acceptance_of("limbo")
 STEP, HORIZON, HEIGHT = 0.005, 1000, 0.35
+MORE = pytest.mark.thorough("another height")
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +136,9 @@ def poses(creature: Creature, count: int) -> list[mujoco.MjData]:
     ]
 
 
-@pytest.mark.parametrize("height", [0.25, 0.3, 0.35])
+@pytest.mark.parametrize(
+    "height", [pytest.param(0.25, marks=MORE), pytest.param(0.3, marks=MORE), 0.35]
+)
 def test_what_evolution_takes_for_clear_is_clear(luxo: Creature, looker: Clearance, height: float):
     """Of all parts, rods and springs between the watched geoms too."""
     found = [(depth(luxo, d, height), clearance(looker, d, height)) for d in poses(luxo, 400)]

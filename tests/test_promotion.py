@@ -1,6 +1,7 @@
 """Everybody is tried in the first start, and only the better ones in the others."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -15,31 +16,54 @@ from mjxgait.controllers.key_poses.operators import pose_variation
 from mjxgait.creature import Creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.evolution import Evolution
-from mjxgait.evolution.state import EvolutionState, GenerationMetrics, Proposal
+from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.evolution.variation import Box
-from mjxgait.training.experiment import Experiment, build_experiment
-from mjxgait.types import Judged
+from mjxgait.training.experiment import Batch, Experiment, build_experiment
+from mjxgait.training.generation import evolution_of, first_trials
+from mjxgait.types import Asked, Judged
 
-STARTS = {"starts": 3, "lanes": 4}
-
-
-def after_the_first_generation(
-    creature: Creature, promote: float
-) -> tuple[Experiment, EvolutionState, GenerationMetrics]:
-    config = small_config(rollout=STARTS | {"promote": promote})
-    experiment = build_experiment(creature, config)
-    state, metrics = experiment.compile()(experiment.place(experiment.init()))
-    return experiment, *jax.device_get((state, metrics))
+Trials = tuple[Experiment, EvolutionState, GenerationMetrics, Callable[[np.ndarray], Judged]]
+"""A run, its first generation, and the verdict on its first genomes in the wanted trials [N, R]
+alone.
+"""
 
 
 @pytest.fixture(scope="module")
-def everybody(stool: Creature) -> tuple[Experiment, EvolutionState, GenerationMetrics]:
-    return after_the_first_generation(stool, 1.0)
+def half(stool: Creature) -> Trials:
+    rollout = {"starts": 3, "lanes": 4, "promote": 0.5}
+    experiment = build_experiment(stool, small_config(rollout=rollout))
+    first, stages = experiment.place(experiment.init()), experiment.stages()
+    state, metrics = jax.device_get(experiment.step(stages)(first))
+    batch = Batch((experiment,))
+    numbers, rows = batch.known
+    states = batch.place(batch.init())
+    proposals, starts = stages.propose(numbers, rows, states)
+    known = first_trials(states, proposals).known
+    assert stages.judge is not None
+
+    def verdict(wanted: np.ndarray) -> Judged:
+        asked = Asked(wanted[None], known)
+        judged = stages.judge(numbers, rows.settings, starts, proposals.offspring, asked)
+        return jax.tree.map(lambda leaf: leaf[0], jax.device_get(judged))
+
+    return experiment, state, metrics, verdict
 
 
 @pytest.fixture(scope="module")
-def half(stool: Creature) -> tuple[Experiment, EvolutionState, GenerationMetrics]:
-    return after_the_first_generation(stool, 0.5)
+def everybody(half: Trials) -> Judged:
+    """The verdict on all in all trials, in the order of `genomes`."""
+    return half[-1](np.ones((6, 3), bool))
+
+
+def genomes(half: Trials) -> list[bytes]:
+    """Those of the first population."""
+    return [poses.tobytes() for poses in np.asarray(half[0].init().genomes.key_poses)]
+
+
+def steps(half: Trials, judged: Judged) -> np.ndarray:
+    """How long each trial lasted, [N, R]."""
+    seconds = judged.outcome[..., half[0].simulator.task.outcomes.index("seconds")]
+    return np.round(seconds / float(half[0].creature.model.opt.timestep)).astype(int)
 
 
 def by_genome(state: EvolutionState) -> dict[bytes, tuple[np.ndarray, float]]:
@@ -52,9 +76,12 @@ def by_genome(state: EvolutionState) -> dict[bytes, tuple[np.ndarray, float]]:
     }
 
 
-def test_who_does_best_in_the_first_start_is_judged_as_if_all_were(everybody: Any, half: Any):
-    experiment, state, _ = everybody
-    known, found = by_genome(state), by_genome(half[1])
+def test_who_does_best_in_the_first_start_is_judged_as_if_all_were(half: Trials, everybody: Judged):
+    experiment, state, _, _ = half
+    rank = evolution_of(experiment.simulator, experiment.config).rank
+    worth = np.asarray(rank(everybody.terms, jnp.int32(0)))
+    known = dict(zip(genomes(half), zip(everybody.terms, worth, strict=True), strict=True))
+    found = by_genome(state)
     assert found.keys() == known.keys()
     task = experiment.simulator.task
     weights = [task.weights(experiment.config.fitness, 0)[name] for name in task.terms]
@@ -70,15 +97,13 @@ def test_who_does_best_in_the_first_start_is_judged_as_if_all_were(everybody: An
             assert fitness == -np.inf
 
 
-def test_only_what_was_run_is_counted(everybody: Any, half: Any):
+def test_only_what_was_run_is_counted(half: Trials, everybody: Judged):
     """Six in the first start, three of them in two more."""
-    experiment, whole, _ = everybody
-    _, some, counted = half
+    _, some, counted, _ = half
     promoted = {genome for genome, (_, fitness) in by_genome(some).items() if np.isfinite(fitness)}
-    tally = jax.device_get(jax.jit(experiment.simulate)(whole.genomes).tally)
     ran = [
-        lived if poses.tobytes() in promoted else lived[:1]
-        for poses, lived in zip(whole.genomes.key_poses, tally.steps, strict=True)
+        lived if genome in promoted else lived[:1]
+        for genome, lived in zip(genomes(half), steps(half, everybody), strict=True)
     ]
     assert len(promoted) == 3
     assert int(counted.episodes) == 12
@@ -86,9 +111,9 @@ def test_only_what_was_run_is_counted(everybody: Any, half: Any):
     assert int(counted.computed_steps) >= int(counted.sim_steps)
 
 
-def test_quartiles_are_of_those_who_were_judged(half: Any):
+def test_quartiles_are_of_those_who_were_judged(half: Trials):
     """As the mean is; half of the population has no fitness. Between two of them it is either."""
-    _, state, told = half
+    _, state, told, _ = half
     judged = state.fitness[np.isfinite(state.fitness)]
     assert 0 < len(judged) < len(state.fitness)
     either = [np.percentile(judged, [25, 50, 75], method=side) for side in ("lower", "higher")]
@@ -97,22 +122,16 @@ def test_quartiles_are_of_those_who_were_judged(half: Any):
     assert told.mean == pytest.approx(judged.mean(), rel=1e-5)
 
 
-def test_a_start_that_is_not_wanted_is_not_simulated(stool: Creature):
-    """Its tally is untouched, and those of the others are what they are when all are wanted."""
-    experiment = build_experiment(stool, small_config(rollout=STARTS))
-    population = jax.tree.map(lambda leaf: leaf[None], experiment.init().genomes)
-    rows = jax.tree.map(lambda leaf: leaf[None], (experiment.starts, experiment.row.settings))
-    wanted = np.arange(18).reshape(1, 6, 3) % 4 == 1
-    simulate = jax.jit(experiment.simulator.simulate)
-    everything, some = jax.device_get(
-        [simulate(population, *rows, jnp.asarray(mask)) for mask in (np.ones_like(wanted), wanted)]
-    )
-    assert (some.tally.steps[~wanted] == 0).all()
-    assert (some.tally.steps[wanted] == everything.tally.steps[wanted]).all()
-    np.testing.assert_allclose(
-        some.tally.forward[wanted], everything.tally.forward[wanted], atol=1e-4
-    )
-    assert some.computed_steps < everything.computed_steps
+def test_a_start_that_is_not_wanted_is_not_simulated(half: Trials, everybody: Judged):
+    """It has no verdict, and those of the others are what they are when all are wanted."""
+    wanted = np.arange(18).reshape(6, 3) % 4 == 1
+    some = half[-1](wanted)
+    assert np.isnan(some.outcome[~wanted]).all()
+    assert (steps(half, everybody)[wanted] > 0).all()
+    assert some.sim_steps == steps(half, everybody)[wanted].sum()
+    np.testing.assert_allclose(some.outcome[wanted], everybody.outcome[wanted], atol=1e-4)
+    np.testing.assert_allclose(some.terms[wanted], everybody.terms[wanted], atol=1e-4)
+    assert some.computed_steps < everybody.computed_steps
 
 
 def judged_first(values: list[float]) -> Judged:
@@ -122,7 +141,8 @@ def judged_first(values: list[float]) -> Judged:
     return Judged(terms, terms, nothing, jnp.int32(0), jnp.int32(0))
 
 
-def toy(**settings: Any) -> tuple[Evolution, EvolutionState, Proposal]:
+def promoted_of(values: list[float], share: float, seeded: int = 0, **settings: Any) -> list[int]:
+    """The places of those promoted of six that come to these values in the first start."""
     config = EvolutionConfig(population=6, **settings)
     box = Box(*(Genome(jnp.full((1, 1), end), jnp.full(1, end)) for end in (-1.0, 1.0)))
 
@@ -131,8 +151,15 @@ def toy(**settings: Any) -> tuple[Evolution, EvolutionState, Proposal]:
         return jnp.where(jnp.isfinite(worth), worth, -jnp.inf)
 
     evolution = Evolution(config, pose_variation(box, config), rank)
-    state = evolution.init(key_of(0), 2, 1, 1)
-    return evolution, state, evolution.propose(state)
+
+    @jax.jit
+    def found() -> jax.Array:
+        state = evolution.init(key_of(0), 2, 1, 1)
+        proposal = evolution.propose(state)
+        state = dataclasses.replace(state, seeded=jnp.int32(seeded))
+        return evolution.promising(state, proposal, judged_first(values), share)
+
+    return np.flatnonzero(found()).tolist()
 
 
 @pytest.mark.parametrize(
@@ -147,18 +174,12 @@ def toy(**settings: Any) -> tuple[Evolution, EvolutionState, Proposal]:
 def test_the_best_of_the_first_start_are_promoted(
     values: list[float], share: float, promoted: list[int]
 ):
-    evolution, state, proposal = toy()
-    found = evolution.promising(state, proposal, judged_first(values), share)
-    assert np.flatnonzero(found).tolist() == promoted
+    assert promoted_of(values, share) == promoted
 
 
 @pytest.mark.parametrize(("seeded", "promoted"), [(6, [0, 1, 5]), (0, [4, 5])])
 def test_whoever_is_judged_once_more_is_tried_in_all_starts(seeded: int, promoted: list[int]):
     """The elite is, whatever it did in the first start; before there is one nobody is."""
-    evolution, state, proposal = toy(survival="children", elite=0.34)
-    state = dataclasses.replace(state, seeded=jnp.int32(seeded))
     share = 0.17 if seeded else 0.34
-    found = evolution.promising(
-        state, proposal, judged_first([0.0, 1.0, 2.0, 3.0, 4.0, 5.0]), share
-    )
-    assert np.flatnonzero(found).tolist() == promoted
+    values = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert promoted_of(values, share, seeded, survival="children", elite=0.34) == promoted

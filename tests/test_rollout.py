@@ -5,15 +5,16 @@ import dataclasses
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import small_config, weight_vector
+from helpers import STOOL, small_config, weight_vector
 
-from mjxgait.config.layers import find_creature, resolve_config
+from mjxgait.config.layers import data_folder, resolve_config
 from mjxgait.config.schema import Config
 from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.creature import Creature, load_creature
@@ -165,23 +166,35 @@ def test_an_episode_ends_at_once_and_says_why(experiment: Experiment, start: dic
     assert (found.forward == 0).all()
 
 
+def standing(experiment: Experiment, low: float = 0.1, **others: jax.Array) -> Sensed:
+    """What is sensed of a body that stands as in its pose, its watched parts so low, but for others."""
+    creature = experiment.creature
+    joints, zero = jnp.zeros(len(creature.joints.names)), jnp.zeros(3)
+    usual = {
+        "joint_pos": joints,
+        "joint_vel": joints,
+        "bias": jnp.zeros(creature.model.nv),
+        "trunk_pos": jnp.array([0.0, 0.0, creature.frame.stand_height]),
+        "trunk_rot": jnp.eye(3),
+        "trunk_vel": zero,
+        "trunk_angvel": zero,
+        "geom_pos": jnp.zeros((len(creature.feet.watched), 3)),
+        "geom_low": jnp.full(len(creature.feet.watched), low),
+    }
+    return Sensed(**usual | others)
+
+
 def reason_to_end(
     experiment: Experiment, height: float = 1.0, up: float = 1.0, low: float = 0.1
 ) -> Reason:
     """What is said of a creature as high above its stand, its trunk so upright, other parts so low."""
-    creature, joints = experiment.creature, jnp.zeros(len(experiment.creature.joints.names))
-    tilt, zero = np.arccos(up), jnp.zeros(3)
+    tilt = np.arccos(up)
     turned = [[1, 0, 0], [0, np.cos(tilt), -np.sin(tilt)], [0, np.sin(tilt), np.cos(tilt)]]
-    sensed = Sensed(
-        joint_pos=joints,
-        joint_vel=joints,
-        bias=jnp.zeros(creature.model.nv),
-        trunk_pos=jnp.array([0.0, 0.0, height * creature.frame.stand_height]),
+    sensed = standing(
+        experiment,
+        low,
+        trunk_pos=jnp.array([0.0, 0.0, height * experiment.creature.frame.stand_height]),
         trunk_rot=jnp.array(turned),
-        trunk_vel=zero,
-        trunk_angvel=zero,
-        geom_pos=jnp.zeros((len(creature.feet.watched), 3)),
-        geom_low=jnp.full(len(creature.feet.watched), low),
     )
     return Reason(int(experiment.simulator.reason(sensed, ())))
 
@@ -219,6 +232,34 @@ def test_nothing_but_a_failed_computation_ends_an_episode_that_is_not_to_end(sto
     assert reason_to_end(endless, height=float("nan")) == Reason.NONFINITE
 
 
+def test_the_dead_are_not_judged_on(experiment: Experiment):
+    """Whatever a body does after its episode has ended: here it stands well again."""
+    simulator, starts = experiment.simulator, experiment.starts
+    creature, fast = experiment.creature, jnp.full(3, 2.0)
+    tally = dataclasses.replace(simulator.task.init(), steps=jnp.int32(7), forward=jnp.float32(0.3))
+    start = jax.tree.map(lambda leaf: leaf[0], starts)
+    lane = SimpleNamespace(
+        aim=simulator.task.aim(start),
+        standards=simulator.task.standards(experiment.row.settings.fitness),
+    )
+    sensed = standing(experiment, trunk_vel=fast)
+    torque = jnp.ones(len(creature.joints.names))
+
+    @jax.jit
+    def after(reason: jax.Array, steps: jax.Array) -> object:
+        lane.tally = dataclasses.replace(tally, reason=reason, steps=steps)
+        return simulator._judge(lane, sensed, torque)
+
+    alive = after(jnp.int32(Reason.FINISHED), jnp.int32(7))
+    assert alive.steps == 8
+    assert alive.reason == Reason.FINISHED
+    for reason, steps in ((Reason.TIPPED, 7), (Reason.FINISHED, simulator.steps)):
+        known = dataclasses.replace(tally, reason=jnp.int32(reason), steps=jnp.int32(steps))
+        found = after(known.reason, known.steps)
+        jax.tree.map(np.testing.assert_array_equal, found, known)
+
+
+@pytest.mark.thorough("test_the_dead_are_not_judged_on asks the same of one step")
 def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
     """A longer episode adds nothing to an individual that has died."""
     long = build_experiment(stool, small_config(rollout={"lanes": 3, "seconds": 0.8}))
@@ -362,12 +403,20 @@ def test_the_stride_limit_of_a_dog():
     assert stride_limit(20.0) == pytest.approx(3.53, abs=0.01)
 
 
+LARGER = pytest.mark.thorough("the same on the stool")
+
+
 @pytest.mark.parametrize(
-    "name", ["crab", pytest.param("duck", marks=pytest.mark.thorough("another body"))]
+    "folder",
+    [
+        STOOL,
+        *(pytest.param(data_folder("envs") / name, marks=LARGER) for name in ("crab", "duck")),
+    ],
+    ids=lambda folder: folder.name,
 )
-def test_mjx_agrees_with_c_mujoco(name: str):
+def test_mjx_agrees_with_c_mujoco(folder: Path):
     """The same controlled motion, 60 steps through touchdown, in float32 MJX and in float64 C MuJoCo."""
-    creature, config = load_creature(find_creature(name)), Config()
+    creature, config = load_creature(folder), Config()
     experiment = build_experiment(
         creature,
         dataclasses.replace(config, rollout=dataclasses.replace(config.rollout, physics="mjx")),

@@ -1,8 +1,12 @@
 """The command as a user runs it: a folder with everything, kills that lose nothing, mistakes in
 one sentence.
+
+Its generations simulate nothing, but where it is said; `test_library` simulates runs.
 """
 
+import contextlib
 import dataclasses
+import io
 import json
 import os
 import re
@@ -10,15 +14,18 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from helpers import STOOL, said_by
+from helpers import STOOL, made_up_judge, said_by
 
 from mjxgait.champion import read_champion
+from mjxgait.cli import main
 from mjxgait.creature import load_creature
+from mjxgait.training import stages
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.folder import open_run, read_metrics
@@ -43,22 +50,67 @@ SMALL = [
 SMALL += ["--seed", "5", "--examination.candidates", "0", "--no-plots", "--checkpoint-every", "1"]
 
 
-def command(*arguments: object) -> list[str]:
-    return [sys.executable, "-m", "mjxgait", *map(str, arguments)]
+COMMAND = """
+import sys
+from helpers import made_up_judge
+from mjxgait.cli import main
+from mjxgait.training import stages
+
+stages.judge = made_up_judge
+main(sys.argv[1:])
+"""
+"""The command, but its generations simulate nothing."""
+
+KILLED = """
+import os, signal, sys, time
+from pathlib import Path
+from mjxgait.training.checkpoint import Checkpoints
+
+save = Checkpoints.save
+
+def saved(checkpoints, state, *others):
+    save(checkpoints, state, *others)
+    if state.generation == 4:
+        while not any(Path(sys.argv[-1], "checkpoints").glob("4*")):
+            time.sleep(0.0005)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+Checkpoints.save = saved
+"""
+"""What kills a process while it saves generation 4 of the run that is its last argument."""
+SIMULATED = "from mjxgait.cli import main; main()"
 
 
-def mjxgait(*arguments: object, code: int = 0) -> str:
-    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
-    return done.stdout + done.stderr
+def command(*arguments: object, code: str = COMMAND) -> list[str]:
+    return [sys.executable, "-c", code, *map(str, arguments)]
+
+
+def ended(*arguments: object, code: str = COMMAND) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command(*arguments, code=code), capture_output=True, text=True, timeout=300, env=here()
+    )
+
+
+def here() -> dict[str, str]:
+    """The environment of a process that finds this process's modules."""
+    return os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nothing_is_simulated() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stages, "judge", made_up_judge)
+        yield
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A run that nobody interrupted, and what it said."""
-    folder = tmp_path_factory.mktemp("runs") / "whole"
-    return folder, mjxgait("train", *SMALL, "--out", folder)
+    folder, said = tmp_path_factory.mktemp("runs") / "whole", io.StringIO()
+    with contextlib.redirect_stdout(said), pytest.raises(SystemExit) as found:
+        main(["train", *SMALL, "--out", str(folder)])
+    assert not found.value.code
+    return folder, said.getvalue()
 
 
 def result(folder: Path) -> dict:
@@ -126,12 +178,13 @@ def test_the_same_seed_gives_the_same_champion(
     assert without_times(tmp_path / "again") == without_times(finished[0])
 
 
-def kill_when(ready: Callable[[], bool], *arguments: object) -> int:
+def kill_when(ready: Callable[[], bool], *arguments: object, code: str = COMMAND) -> int:
     """Starts a command and kills it as soon as `ready` holds; returns its exit code."""
     process = subprocess.Popen(
-        command(*arguments),
+        command(*arguments, code=code),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
+        env=here(),
     )
     deadline = time.monotonic() + 200
     while not ready() and process.poll() is None and time.monotonic() < deadline:
@@ -151,24 +204,54 @@ def saving(folder: Path, generation: int) -> Callable[[], bool]:
     return lambda: any((folder / "checkpoints").glob(f"{generation}.*tmp*"))
 
 
-MOMENTS = ("generation 2", "save 4")
+class Killed(BaseException):
+    """Nothing in the program catches it."""
 
 
 def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
-    finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
+    finished: tuple[Path, str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
 ):
-    """Killed in generations and amid checkpoints: each time it goes on from what was left."""
-    folder, codes = tmp_path / "killed", []
-    begin = ("train", *SMALL, "--out", folder)
-    for moment in MOMENTS:
-        kind, number = moment.split()
-        ready = (generations if kind == "generation" else saving)(folder, int(number))
-        codes.append(kill_when(ready, *begin))
-        begin = ("train", "--resume", folder, "--no-plots")
-    assert -signal.SIGKILL in codes, "at most one moment may have passed unseen"
-    said_by(capsys, *begin, code=0)
+    """Ended between log and checkpoint, killed amid a checkpoint: it goes on from what was left."""
+    folder, save = tmp_path / "killed", Checkpoints.save
+
+    def saved(checkpoints: Checkpoints, state, *others: str) -> None:
+        if state.generation == 2:
+            raise Killed
+        save(checkpoints, state, *others)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpoints, "save", saved)
+        with pytest.raises(Killed):
+            main(["train", *SMALL, "--out", str(folder)])
+    assert [line["generation"] for line in read_metrics(folder / "metrics.jsonl")] == [0, 1, 2]
+    assert not (folder / "checkpoints" / "2").exists()
+    process = ended("train", "--no-plots", "--resume", folder, code=KILLED + COMMAND)
+    assert process.returncode == -signal.SIGKILL, process.stderr
+    assert len(read_metrics(folder / "metrics.jsonl")) < 8
+    said_by(capsys, "train", "--resume", folder, "--no-plots", code=0)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
+
+
+@pytest.mark.thorough("one that simulates nothing is killed too, and `test_library` repeats a run")
+def test_a_run_that_simulates_is_killed_again_and_again_too(tmp_path: Path):
+    """In processes of its own, killed in a generation and amid a checkpoint."""
+    whole, folder, codes = tmp_path / "whole", tmp_path / "killed", []
+    done = ended("train", *SMALL, "--out", whole, code=SIMULATED)
+    assert done.returncode == 0, done.stderr
+    begin = ("train", *SMALL, "--out", folder)
+    for ready in (generations(folder, 2), saving(folder, 4)):
+        codes.append(kill_when(ready, *begin, code=SIMULATED))
+        begin = ("train", "--resume", folder, "--no-plots")
+    assert -signal.SIGKILL in codes, "at most one moment may have passed unseen"
+    done = ended(*begin, code=SIMULATED)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert result(folder) == result(whole)
+    assert without_times(folder) == without_times(whole)
 
 
 @pytest.mark.thorough("a run that is killed twice is compared too")
@@ -244,7 +327,7 @@ def test_a_run_that_is_over_says_how_to_go_on_and_does_nothing(
 
 
 def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
-    finished: tuple[Path, str], tmp_path: Path
+    finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     folder = tmp_path / "interrupted"
     arguments = [
@@ -256,14 +339,21 @@ def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
         "--out",
         folder,
     ]
-    process = subprocess.Popen(
-        command("train", *arguments), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
-    while not generations(folder, 3)():
-        time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=60)[0]
-    assert process.returncode == 130
+    over = threading.Event()
+
+    def interrupt() -> None:
+        while not (generations(folder, 3)() or over.is_set()):
+            time.sleep(0.01)
+        if not over.is_set():
+            signal.raise_signal(signal.SIGINT)
+
+    waiting = threading.Thread(target=interrupt)
+    waiting.start()
+    try:
+        said = said_by(capsys, "train", *arguments, code=130)
+    finally:
+        over.set()
+        waiting.join()
     assert f"mjxgait train --resume {folder}" in said
     last = read_metrics(folder / "metrics.jsonl")[-1]["generation"]
     assert (folder / "checkpoints" / str(last)).is_dir()

@@ -15,6 +15,7 @@ from mjxgait.simulation.rollout import CHECK_EVERY
 from mjxgait.tasks.starts import NEVER, Starts, draw_starts
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.generation import next_starts
+from mjxgait.types import BodyState
 
 NONE = {
     "joint_noise": 0.0,
@@ -110,17 +111,39 @@ def test_torques_are_up_to_so_many_steps_late_but_in_the_first_start(stool: Crea
     assert set(delay) == {0, 1, 2}
 
 
-def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):
+@pytest.fixture(scope="module")
+def weighed(stool: Creature) -> Experiment:
+    """A run whose starts differ in nothing but the masses."""
+    return build_experiment(stool, small_config(rollout={**NONE, "masses": 0.2, "starts": 3}))
+
+
+def test_the_bodies_of_a_run_weigh_what_their_starts_say(weighed: Experiment):
     """All that follows from the masses is reckoned too: `Plant.heavier`, whose own tests compare C."""
-    config = small_config(rollout={**NONE, "masses": 0.2, "starts": 3})
-    experiment = build_experiment(stool, config)
-    numbers, plain = experiment.starts.numbers, experiment.simulator.plant.parameters
-    masses = jax.jit(experiment.simulator.plant.heavier)(plain, experiment.starts.heaviness[1])
-    for leaf, its in zip(jax.tree.leaves(numbers), jax.tree.leaves(masses), strict=True):
+    simulator, starts, settings = weighed.simulator, weighed.starts, weighed.row.settings
+    plain = simulator.plant.parameters
+    masses = jax.jit(simulator.plant.heavier)(plain, starts.heaviness[1])
+
+    given = weighed.init().genomes, starts, settings
+    genomes, *rows = jax.tree.map(lambda leaf: leaf[None], given)
+
+    @jax.jit
+    def lane() -> BodyState:
+        """In the second start."""
+        prepare = jax.vmap(jax.vmap(simulator.controller.prepare, (0, None)))
+        plans = prepare(genomes, rows[-1].controller)
+        job = jnp.int32(0)
+        return simulator._fresh_lane(plans, *rows, None, job, jnp.int32(1)).body
+
+    own = lane().parameters
+    for leaf, its, one in zip(*map(jax.tree.leaves, (starts.numbers, masses, own)), strict=True):
         np.testing.assert_allclose(leaf[1], its, rtol=1e-6)
-    # Nothing else tells the starts apart: where the masses count, everybody moves otherwise in
-    # each.
-    forward = jax.jit(experiment.simulate)(experiment.init().genomes).tally.forward
+        np.testing.assert_array_equal(leaf[1], one)
+
+
+@pytest.mark.thorough("tests/physics/test_bodies_in_episodes.py has bodies that walk differently")
+def test_where_the_masses_count_everybody_moves_otherwise(weighed: Experiment):
+    """Nothing else tells the starts apart."""
+    forward = jax.jit(weighed.simulate)(weighed.init().genomes).tally.forward
     assert np.abs(np.diff(forward, axis=1)).max() > 1e-5
 
 

@@ -89,17 +89,31 @@ def test_a_share_is_of_the_disturbed_starts_that_are_managed(
             assert len(outcome["forward"]) == STARTS
             return outcome["forward"] > middle
 
-    genomes = jax.tree.map(lambda leaf: leaf[jnp.array(ranks)], state.genomes)
-    starts = jax.tree.map(lambda leaf: leaf[0], trying._starts)
-    tally = jax.jit(lambda g: trying._trials.simulate(g, starts).tally)(genomes)
-    ways = np.asarray(jax.vmap(jax.vmap(lambda one: task.outcome(one)["forward"]))(tally))[:, 1:]
+    program = trying._program
+    numbers, rows = trying._batch.known
+
+    def alone(rank: int) -> np.ndarray:
+        """How far one gets in each disturbed start where all are that one."""
+        genomes = jax.tree.map(lambda leaf: leaf[None, jnp.full(MOST, rank)], state.genomes)
+        outcome = program(numbers, rows.settings, trying._starts, genomes).outcome
+        return np.asarray(outcome)[0, 0, 1:, task.outcomes.index("forward")]
+
+    ways = np.array([alone(rank) for rank in ranks])
     middle = float(np.median(ways))
     monkeypatch.setattr(Tryout, "_demands", AboveTheMedian)
     assert trying.shares(state, ranks).tolist() == (ways > middle).mean(1).tolist()
     assert np.ptp((ways > middle).mean(1)) > 0
-    ahead = Tryout(experiment)
+    ahead, compiled = Tryout(experiment), list[Tryout]()
+
+    def once(self: Tryout) -> jax.stages.Compiled:
+        """To compile once more would be the same."""
+        compiled.append(self)
+        return program
+
+    monkeypatch.setattr(Tryout, "_compile", once)
     ahead.begin()
     assert ahead.shares(state, ranks).tolist() == trying.shares(state, ranks).tolist()
+    assert compiled == [ahead]
 
 
 def test_the_margin_is_that_of_the_criterion_which_the_starts_decide(experiment: Experiment):

@@ -108,7 +108,7 @@ amount = st.floats(0.0, 1024.0, width=32, allow_subnormal=False)
 everything = st.fixed_dictionaries(dict.fromkeys(MISSES, amount))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     weights=st.fixed_dictionaries({n: amount for n in TERMS if n not in ("distance", *WHIP)}),
     worth=st.floats(0.0078125, 128.0, width=32),

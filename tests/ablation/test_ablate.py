@@ -3,6 +3,7 @@ that lose nothing.
 """
 
 import contextlib
+import io
 import json
 import re
 import shutil
@@ -10,13 +11,24 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import psutil
 import pyarrow.parquet
 import pytest
-from helpers import STOOL, said_by
+from ablation import killed
+from helpers import STOOL, made_up_judge, said_by
 
+import mjxgait.processes
+from mjxgait.cli import main
+from mjxgait.distributed import evolve
+from mjxgait.distributed.recipe import Programs
+from mjxgait.distributed.scheduler import LocalBackend
+from mjxgait.experiments.ablation import findings, rows
+from mjxgait.training import stages
+from mjxgait.training.checkpoint import Checkpoints, Packed
 from mjxgait.training.folder import read_metrics
 
 STUDY = f"""
@@ -50,11 +62,25 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, str(SHORT), *map(str, arguments)]
 
 
-def mjxgait(*arguments: object, code: int = 0) -> str:
+def mjxgait_of_its_own(*arguments: object, code: int = 0) -> str:
+    """What the command says in a process of its own."""
     done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
     return done.stdout + done.stderr
+
+
+def ended(*arguments: object, code: int) -> tuple[str, str]:
+    """What the command says on its two streams in this process, where it ends with this code."""
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        pytest.raises(SystemExit) as found,
+    ):
+        main([*map(str, arguments)])
+    assert found.value.code == code, err.getvalue()
+    return out.getvalue(), err.getvalue()
 
 
 @pytest.fixture(scope="module")
@@ -64,42 +90,57 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="module", autouse=True)
+def cheap() -> Iterator[None]:
+    """In this process only evolution is compiled, once for all; one process measures 1 s of walking.
+
+    `test_hyper` compiles whole runs side by side, and `test_cores` counts processes.
+    """
+    programs = Programs()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stages, "judge", made_up_judge)
+        patch.setattr(evolve, "LocalBackend", partial(LocalBackend, programs))
+        patch.setattr(mjxgait.processes, "cores", lambda: 1)
+        patch.setattr(rows, "_judge", killed.judge)
+        patch.setattr(findings, "RESAMPLES", 499)
+        yield
+
+
+class Killed(BaseException):
+    """Nothing in the program catches it."""
+
+
 @pytest.fixture(scope="module")
 def finished(study: Path) -> tuple[Path, str]:
-    """Folder and report of a study that was killed amid its runs, and then while it measured.
+    """Folder and report of a study that ended amid its runs, and was killed while it measured.
 
-    The second time as a system kills that is out of memory: then it says so, and goes on too.
+    The first time between the log of a generation and its checkpoint. The second time as a system
+    kills that is out of memory: then it says so. Each time it goes on.
     """
-    folder = study.parent / "out"
-    process = subprocess.Popen(
-        command("ablate", study, "--out", folder),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
+    folder, keep = study.parent / "out", Checkpoints.keep
+
+    def kept(checkpoints: Checkpoints, state: Packed, *others: str) -> None:
+        if state.generation == 1:
+            raise Killed
+        keep(checkpoints, state, *others)
+
+    said = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
+        patch.setattr(Checkpoints, "keep", kept)
+        with pytest.raises(Killed):
+            main(["ablate", str(study), "--out", str(folder)])
     log = folder / "groups/0/metrics.jsonl"
-    while not (log.exists() and any(line["generation"] >= 1 for line in read_metrics(log))):
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    begun, _ = process.communicate()
-    process = subprocess.Popen(
-        command("ablate", "--resume", folder), stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
-    measured = folder / "measured.jsonl"
-    # At work, and not while it is started.
-    while not measured.exists() or measured.read_bytes().count(b"\n") < 1:
-        assert process.poll() is None
-        time.sleep(0.001)
-    worker_of(process).kill()
-    said = process.communicate(timeout=300)[1].decode()
-    assert process.returncode == 2
+    assert {line["generation"] for line in read_metrics(log)} == {0, 1}
+    told = ended("ablate", "--resume", folder, code=2)[1]
     assert re.fullmatch(
         f"mjxgait: {folder}: .* was killed from outside, .* go on with "
         f"mjxgait ablate --resume {folder}\n",
-        said,
+        told,
     )
-    return folder, begun + mjxgait("ablate", "--resume", folder)
+    before = (folder / rows.MEASURED).read_text()
+    report = ended("ablate", "--resume", folder, code=0)[0]
+    assert (folder / rows.MEASURED).read_text().startswith(before)
+    return folder, said.getvalue() + report
 
 
 def test_the_report_holds_everything(finished: tuple[Path, str]):
@@ -126,20 +167,59 @@ def test_the_report_holds_everything(finished: tuple[Path, str]):
     ].keys()
 
 
+@pytest.fixture(scope="module")
+def killed_twice(study: Path) -> Path:
+    """Folder of a study whose process was killed amid its runs, and then while it measured."""
+    folder = study.parent / "killed"
+    process = subprocess.Popen(
+        command("ablate", study, "--out", folder),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    log = folder / "groups/0/metrics.jsonl"
+    while not (log.exists() and any(line["generation"] >= 1 for line in read_metrics(log))):
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    process = subprocess.Popen(
+        command("ablate", "--resume", folder), stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    measured = folder / "measured.jsonl"
+    # At work, and not while it is started.
+    while not measured.exists() or measured.read_bytes().count(b"\n") < 1:
+        assert process.poll() is None
+        time.sleep(0.001)
+    worker_of(process).kill()
+    said = process.communicate(timeout=300)[1].decode()
+    assert process.returncode == 2
+    assert "was killed from outside" in said
+    mjxgait_of_its_own("ablate", "--resume", folder)
+    return folder
+
+
+def worker_of(process: subprocess.Popen) -> psutil.Process:
+    """The first process that measures."""
+    for child in psutil.Process(process.pid).children():
+        with contextlib.suppress(psutil.NoSuchProcess):  # one that asked the system something
+            if any("spawn_main" in part for part in child.cmdline()):
+                return child
+    raise AssertionError(process.communicate())
+
+
 @pytest.mark.thorough("test_hyper compares a row with a run alone, to the bit")
-def test_a_row_is_the_run_that_train_makes(finished: tuple[Path, str], tmp_path: Path):
+def test_a_row_is_the_run_that_train_makes(killed_twice: Path, tmp_path: Path):
     """Same seed, same settings: the same log. Here up to rounding, which differs between the two
     programs; `test_hyper` compares a row with the run alone to the bit, on MJX.
     """
-    folder, _ = finished
     train = "--seed 1 --population 6 --generations 3 --drive.law pd"
     train += " --rollout.seconds 0.4 --rollout.starts 2 --rollout.lanes 4"
     train += " --evolution.forced.patience 0 --examination.candidates 0 --no-plots"
     out = tmp_path / "alone"
-    mjxgait("train", "--env", STOOL, *train.split(), "--out", out)
+    mjxgait_of_its_own("train", "--env", STOOL, *train.split(), "--out", out)
     row = [
         line
-        for line in read_metrics(folder / "groups/0/metrics.jsonl")
+        for line in read_metrics(killed_twice / "groups/0/metrics.jsonl")
         if (line["variant"], line["seed"]) == ("plain PD", 1)
     ]
     alone = read_metrics(out / "metrics.jsonl")
@@ -170,30 +250,26 @@ def test_the_same_data_give_the_same_report_byte_for_byte(
     for name in names:
         (copy / name).unlink()
     said_by(capsys, "ablate", "--resume", copy, code=0)
-    again = tmp_path / "again"
-    shutil.copytree(copy, again)
-    said_by(capsys, "ablate", "--resume", again, code=0)
     for name in names:
-        assert (again / name).read_bytes() == (copy / name).read_bytes(), name
-    assert (copy / "results.csv").read_bytes() == (folder / "results.csv").read_bytes()
+        assert (copy / name).read_bytes() == (folder / name).read_bytes(), name
 
 
-def worker_of(process: subprocess.Popen) -> psutil.Process:
-    """The first process that measures."""
-    for child in psutil.Process(process.pid).children():
-        with contextlib.suppress(psutil.NoSuchProcess):  # one that asked the system something
-            if any("spawn_main" in part for part in child.cmdline()):
-                return child
-    raise AssertionError(process.communicate())
-
-
-@pytest.mark.thorough("the study of all other tests here was killed twice")
-def test_a_study_killed_twice_ends_as_one_that_was_not(
+def test_a_study_that_did_not_go_through_in_one_go_ends_as_one_that_did(
     finished: tuple[Path, str], study: Path, tmp_path: Path
 ):
-    mjxgait("ablate", study, "--out", tmp_path / "whole")
+    (tmp_path / "whole-was-killed").touch()
+    ended("ablate", study, "--out", tmp_path / "whole", code=0)
     for name in ("results.csv", "generations.parquet"):
         assert (tmp_path / "whole" / name).read_bytes() == (finished[0] / name).read_bytes()
+
+
+@pytest.mark.thorough("a study that stopped amid its runs and lost a process is compared too")
+def test_a_study_killed_twice_ends_as_one_that_was_not(
+    killed_twice: Path, study: Path, tmp_path: Path
+):
+    mjxgait_of_its_own("ablate", study, "--out", tmp_path / "whole")
+    for name in ("results.csv", "generations.parquet"):
+        assert (tmp_path / "whole" / name).read_bytes() == (killed_twice / name).read_bytes()
 
 
 def test_a_study_that_would_take_days_is_refused_with_the_estimate(

@@ -28,7 +28,7 @@ def test_the_interquartile_mean_is_the_mean_of_the_middle_half():
 @pytest.fixture
 def fewer_resamples(monkeypatch: pytest.MonkeyPatch) -> None:
     """For studies by the hundred: whatever their number, an error is as frequent as is said."""
-    monkeypatch.setattr(findings, "RESAMPLES", 999)
+    monkeypatch.setattr(findings, "RESAMPLES", 399)
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_says(fewer_resamples: None):

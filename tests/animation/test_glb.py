@@ -10,12 +10,15 @@ import mujoco
 import numpy as np
 import pygltflib as gltf
 import pytest
+from conftest import SHIPPED
 from viewing.made_up import treading
 
 from mjxgait.animation.export import RATES, build_glb, walk_loop
 from mjxgait.animation.export.skeleton import gltf_axes, resting
 from mjxgait.animation.export.surface import ALONG, geom_surface
 from mjxgait.cli import main
+from mjxgait.config.layers import find_creature
+from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.rendering.walk import record_walk
 
@@ -29,9 +32,20 @@ KIND = {
 }
 
 
-@pytest.fixture(scope="module")
-def loop(shipped):
-    return walk_loop(record_walk(shipped, treading(shipped, degrees=8.0), 4.0), 30)
+ALWAYS = ("crab", "luxo")
+"""One with many legs, and one that has a single one and shapes of its own."""
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        name if name in ALWAYS else pytest.param(name, marks=pytest.mark.thorough("a body more"))
+        for name in SHIPPED
+    ],
+)
+def loop(request):
+    creature = load_creature(find_creature(request.param))
+    return walk_loop(record_walk(creature, treading(creature, degrees=8.0), 4.0), 30)
 
 
 def read(document, accessor):

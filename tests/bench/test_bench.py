@@ -4,17 +4,16 @@ import dataclasses
 import importlib.util
 import json
 import shutil
-import subprocess
-import sys
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import STOOL, pose_champion, small_config
+from helpers import STOOL, made_up_judge, pose_champion, said_by, small_config
 
-from mjxgait.bench import contest
+import mjxgait.processes
+from mjxgait.bench import c_peer, contest, machine
 from mjxgait.bench.machine import count_flops
 from mjxgait.bench.mujoco_peer import DampedSolve, Law, MujocoPeer
 from mjxgait.bench.ours import as_workload
@@ -29,6 +28,7 @@ from mjxgait.errors import UserError
 from mjxgait.plugins import resolve_config
 from mjxgait.reference.layout import start_frame
 from mjxgait.reference.state import State, sense
+from mjxgait.training import stages
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.generation import next_starts
 
@@ -297,32 +297,46 @@ def test_the_curves_are_of_one_creature(tmp_path):
         bench.bench_command(["--json", str(tmp_path / "b.json"), "--env", "all", "--scaling"])
 
 
+MADE_UP_COST = {"flops_asked": 2.0, "flops": 3.0, "bytes": 5.0, "state_bytes": 1.0}
+"""A cost per step; to know the true one the step is compiled once more."""
+
+
+@pytest.fixture
+def unsimulated(monkeypatch):
+    """We simulate nothing, so that only evolution is compiled; the rivals run on one core."""
+    monkeypatch.setattr(stages, "judge", made_up_judge)
+    monkeypatch.setattr(contest, "step_cost", lambda experiment: MADE_UP_COST)
+    for module in (contest, machine, c_peer, mjxgait.processes):
+        monkeypatch.setattr(module, "cores", lambda: 1)
+
+
+SIMULATED = pytest.mark.thorough("compiles the whole; each part has tests of its own")
+
+
 @pytest.mark.slow
-def test_the_command_writes_the_ratios(tmp_path):
+@pytest.mark.parametrize(
+    "simulated", [False, pytest.param(True, marks=SIMULATED)], ids=["made up", "simulated"]
+)
+def test_the_command_writes_the_ratios(tmp_path, capsys, request, simulated):
     """On a body whose starts vary by generation, as those of the shipped ones do."""
+    if not simulated:
+        request.getfixturevalue("unsimulated")
     file, body = tmp_path / "bench.json", tmp_path / "body"
     shutil.copytree(STOOL, body)
     with (body / "creature.toml").open("a", encoding="utf-8") as settings:
         settings.write('\n[train]\nbase = "other_starts"\nrollout = { seconds = 1.0 }\n')
     arguments = [
-        "bench",
-        "--json",
-        str(file),
-        "--env",
-        str(body),
-        "--rounds",
-        "1",
-        "--generations",
-        "1",
-        "--population",
-        "8",
+        *("--json", file, "--env", body),
+        *("--rounds", 1, "--generations", 1, "--population", 8),
     ]
-    subprocess.run([sys.executable, "-m", "mjxgait", *arguments], check=True, capture_output=True)
+    said_by(capsys, "bench", *arguments, code=0)
     found = json.loads(file.read_text(encoding="utf-8"))
     assert found["ratio_over_mujoco_c"] > 0
     assert found["workload"]["starts"] == walking(load_creature(body).settings).rollout.starts
     assert (found["ratio_over_c"] is None) == ("c" in found["left_out"])
-    assert found["laps"]["ours"][0]["steps"] == pytest.approx(
-        found["laps"]["mujoco_c"][0]["steps"], rel=0.1
-    )
+    ours, theirs = (found["laps"][name][0]["steps"] for name in ("ours", "mujoco_c"))
+    if simulated:
+        assert ours == pytest.approx(theirs, rel=0.1)
+    else:  # a step of each episode, and all of the rivals'
+        assert 0 < ours < theirs
     assert (found["ratio_over_dart"] is None) == ("dart" in found["left_out"])

@@ -7,8 +7,30 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.controllers.sims_brain.genotype import Graph
+from mjxgait.controllers.sims_brain.genotype import (
+    Capacity,
+    Graph,
+    Ranges,
+    random_graph,
+)
+from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.evolution.chance import key_of
 from mjxgait.types import Sensed
+
+CAPACITY, LANES = Capacity(), 96
+"""Of random bodies; with these numbers all tests share compiled programs."""
+_draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
+_embody = jax.jit(jax.vmap(lambda graph: body_of(graph, CAPACITY)))
+
+
+def random_graphs(seed: int) -> Graph:
+    """[LANES]."""
+    return _draw(jax.random.split(key_of(seed), LANES))
+
+
+def bodies_of(graphs: Graph) -> Body:
+    """What graphs [LANES] grow into."""
+    return _embody(graphs)
 
 
 def one(tree: Any, place: int) -> Any:

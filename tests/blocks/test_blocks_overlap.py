@@ -4,29 +4,25 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from blocks.made_up import genome_of, one
+from blocks.made_up import CAPACITY, LANES, bodies_of, genome_of, one, random_graphs
 
-from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges, random_graph
-from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.phenotype import Body
 from mjxgait.controllers.sims_brain.reference_body import Part, grow
 from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature.scale import load_files
-from mjxgait.evolution.chance import key_of
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Surroundings
 from mjxgait.reference.sight import overlaps
 from mjxgait.types import BodyState
 
-CAPACITY, COUNT = Capacity(), 80
-
 
 def ours(bodies: Body, bent: np.ndarray) -> np.ndarray:
-    """[COUNT] of the smaller block's size, of angles [COUNT, links]."""
+    """[LANES] of the smaller block's size, of angles [LANES, links]."""
     tree = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), bodies.tree)
-    root = np.tile([[0.0], [0], [0], [1], [0], [0], [0]], COUNT)
-    still = jnp.zeros((CAPACITY.links + 5, COUNT))
+    root = np.tile([[0.0], [0], [0], [1], [0], [0], [0]], LANES)
+    still = jnp.zeros((CAPACITY.links + 5, LANES))
     qpos = jnp.float32(np.concatenate([root, bent[:, 1:].T]))
-    state = BodyState(qpos, still, still, still, jnp.ones(COUNT), parameters=tree)
+    state = BodyState(qpos, still, still, still, jnp.ones(LANES), parameters=tree)
     return np.asarray(jax.jit(TreePlant(Surroundings(floor=False)).overlap)(state))
 
 
@@ -49,14 +45,12 @@ def theirs(body: Body, parts: list[Part], bent: np.ndarray) -> float:
 @pytest.fixture(scope="module")
 def depths() -> tuple[np.ndarray, np.ndarray]:
     """Ours and MuJoCo's, of random bodies in random poses that have a hinge and two parts."""
-    keys = jax.random.split(key_of(7), COUNT)
-    make = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
-    graphs = make(keys)
-    bodies = jax.jit(jax.vmap(lambda graph: body_of(graph, CAPACITY)))(graphs)
-    bent = np.random.default_rng(7).uniform(-1.6, 1.6, (COUNT, CAPACITY.links))
+    graphs = random_graphs(7)
+    bodies = bodies_of(graphs)
+    bent = np.random.default_rng(7).uniform(-1.6, 1.6, (LANES, CAPACITY.links))
     bent = bent * np.asarray(bodies.tree.moves)
-    found, expected = ours(bodies, bent), np.full(COUNT, np.nan)
-    for i in range(COUNT):
+    found, expected = ours(bodies, bent), np.full(LANES, np.nan)
+    for i in range(LANES):
         parts = grow(genome_of(one(graphs, i)), CAPACITY.parts, CAPACITY.links)
         if any(part.hinges for part in parts):
             expected[i] = theirs(one(bodies, i), parts, bent[i])

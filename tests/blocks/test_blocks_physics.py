@@ -1,7 +1,8 @@
 """Random bodies of blocks, each lane another, against C MuJoCo on the model of each."""
 
 import dataclasses
-from functools import partial
+from collections.abc import Callable
+from functools import cache, partial
 from typing import Any
 
 import jax
@@ -9,39 +10,49 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from blocks.made_up import genome_of, one
+from blocks.made_up import CAPACITY, LANES, bodies_of, genome_of, one, random_graphs
 
-from mjxgait.controllers.sims_brain.genotype import (
-    Capacity,
-    Graph,
-    Ranges,
-    random_graph,
-)
-from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.genotype import Graph
+from mjxgait.controllers.sims_brain.phenotype import Body
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.controllers.sims_brain.reference_files import body_xml
 from mjxgait.creature.geometry import DOWN, geom_reach, lowest
-from mjxgait.evolution.chance import key_of
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Surroundings
 from mjxgait.tasks.modular.follow import Following
 from mjxgait.types import BodyState
 
-CAPACITY, LANES = Capacity(), 96
-ON_LAND = Surroundings(contact=0.01, iterations=20, line_iterations=20)
+ON_LAND = Surroundings(contact=0.01, iterations=20, line_iterations=20, lit=True)
 IN_WATER = Surroundings(floor=False, gravity=0.0, drag=300.0)
-forward = jax.jit(TreePlant(ON_LAND).forward)
+
+
+@cache
+def stepping(around: Surroundings) -> Callable[..., Any]:
+    """From a state and torques to what is sensed, how near corners are, and the next state."""
+    plant = TreePlant(around)
+
+    def step(state: BodyState, torque: jax.Array) -> Any:
+        sensed, workings = plant.forward(state)
+        near = workings.touch.distance if around.floor else None
+        return sensed, near, plant.advance(state, workings, torque)
+
+    return jax.jit(step)
+
+
+def looked_at(state: BodyState) -> tuple[Any, np.ndarray]:
+    """What is sensed on land, and how near corners are to the ground."""
+    sensed, near, _ = stepping(ON_LAND)(state, jnp.zeros_like(state.qvel))
+    return jax.tree.map(np.asarray, sensed), np.asarray(near)
 
 
 @pytest.fixture(scope="module")
 def graphs() -> Graph:
-    draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
-    return draw(jax.random.split(key_of(1), LANES))
+    return random_graphs(1)
 
 
 @pytest.fixture(scope="module")
 def bodies(graphs: Graph) -> Body:
-    return jax.jit(jax.vmap(lambda graph: body_of(graph, CAPACITY)))(graphs)
+    return bodies_of(graphs)
 
 
 def model_of(graph: Graph, around: Surroundings) -> mujoco.MjModel:
@@ -112,14 +123,18 @@ def test_bodies_weigh_what_mujoco_says(graphs: Graph, bodies: Body):
         )
 
 
-@pytest.mark.parametrize("around", [ON_LAND, Surroundings(floor=False)], ids=["land", "air"])
+AIR = pytest.param(
+    Surroundings(floor=False),
+    marks=pytest.mark.thorough("test_swimming.py compares whole swims, without a floor"),
+)
+
+
+@pytest.mark.parametrize("around", [ON_LAND, AIR], ids=["land", "air"])
 def test_a_step_is_that_of_c_mujoco(graphs: Graph, bodies: Body, around: Surroundings):
-    plant, state = TreePlant(around), moments(bodies, 0.3)
+    state = moments(bodies, 0.3)
     moves = np.concatenate([np.zeros((6, LANES)), np.asarray(bodies.tree.moves)[:, 1:].T])
     torque = np.random.default_rng(2).normal(size=moves.shape) * moves * 5
-    after = jax.jit(lambda s, u: plant.advance(s, plant.forward(s)[1], u))(
-        state, jnp.float32(torque)
-    )
+    after = stepping(around)(state, jnp.float32(torque))[2]
     wrong, touching = [], 0
     for lane in range(LANES):
         model, data, links = in_mujoco(one(graphs, lane), one(bodies, lane), state, lane, around)
@@ -137,7 +152,7 @@ def test_a_step_is_that_of_c_mujoco(graphs: Graph, bodies: Body, around: Surroun
 
 def test_what_is_sensed_is_where_it_is_in_c_mujoco(graphs: Graph, bodies: Body):
     state = moments(bodies, 0.3)
-    sensed = jax.tree.map(np.asarray, forward(state)[0])
+    sensed, _ = looked_at(state)
     for lane in range(LANES):
         body = one(bodies, lane)
         model, data, links = in_mujoco(one(graphs, lane), body, state, lane, ON_LAND)
@@ -163,7 +178,7 @@ def test_what_is_sensed_is_where_it_is_in_c_mujoco(graphs: Graph, bodies: Body):
 def test_the_corners_that_touch_are_those_of_c_mujoco(graphs: Graph, bodies: Body):
     """The four that are below a block's middle, however deep in the ground it is."""
     state = moments(bodies, 0.0)
-    distance = np.asarray(forward(state)[1].touch.distance).reshape(-1, CAPACITY.links, LANES)
+    distance = looked_at(state)[1].reshape(-1, CAPACITY.links, LANES)
     for lane in range(LANES):
         body = one(bodies, lane)
         model, data, _ = in_mujoco(one(graphs, lane), body, state, lane, ON_LAND)
@@ -188,7 +203,7 @@ def test_bodies_rest_on_the_ground(graphs: Graph, bodies: Body):
         low = np.asarray(rested(bodies.tree, qpos))
         np.testing.assert_array_equal(np.delete(low, 2, axis=1), np.delete(qpos, 2, axis=1))
         state = dataclasses.replace(moments(bodies, 0.0), qpos=jnp.asarray(low.T))
-        sensed = forward(state)[0]
+        sensed, _ = looked_at(state)
         np.testing.assert_allclose(np.asarray(sensed.geom_low).min(0), 0.0, atol=1e-6)
         np.testing.assert_allclose(sensed.sunk, 0.0, atol=1e-4)
     low = np.asarray(rested(bodies.tree, straight))
@@ -203,7 +218,7 @@ def test_bodies_rest_on_the_ground(graphs: Graph, bodies: Body):
 
 def test_who_is_deepest_in_the_ground_is_told_in_its_size(bodies: Body):
     state = moments(bodies, 0.0)
-    sensed = jax.tree.map(np.asarray, forward(state)[0])
+    sensed, _ = looked_at(state)
     for lane in range(LANES):
         tree = one(bodies, lane).tree
         size = np.cbrt(8 * tree.half.prod(1))
@@ -214,8 +229,7 @@ def test_who_is_deepest_in_the_ground_is_told_in_its_size(bodies: Body):
 
 def test_the_light_is_seen_in_each_blocks_own_axes(graphs: Graph, bodies: Body):
     state, place = moments(bodies, 0.3), np.array([3.0, -4.0, 1.0])
-    lit = TreePlant(dataclasses.replace(ON_LAND, lit=True))
-    sensed = jax.jit(lit.forward)(state)[0]
+    sensed, _ = looked_at(state)
     nobody: Any = None
     look = jax.vmap(partial(Following.senses, nobody, jnp.float32(place)), in_axes=-1)
     seen = np.asarray(jax.jit(look)(sensed)["light"])

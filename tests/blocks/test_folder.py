@@ -1,26 +1,22 @@
 """A grown body is a creature like any other: two files that load, and stand on the ground."""
 
-import jax
 import mujoco
 import numpy as np
 import pytest
-from blocks.made_up import genome_of, one
+from blocks.made_up import CAPACITY, genome_of, one, random_graphs
 
-from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges, random_graph
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.evolution.chance import key_of
 from mjxgait.reference.sight import overlaps
 
-CAPACITY, COUNT = Capacity(), 60
+COUNT = 60
 
 
 @pytest.fixture(scope="module")
 def grown_parts() -> list:
-    draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
-    graphs = draw(jax.random.split(key_of(8), COUNT))
+    graphs = random_graphs(8)
     every = (genome_of(one(graphs, place)) for place in range(COUNT))
     return [grow(genome, CAPACITY.parts, CAPACITY.links) for genome in every]
 

@@ -28,6 +28,7 @@ CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(), Ranges(), 2000
 KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))
 BUSY = ("mutate", "cross", "graft")
 ALIVE = jax.jit(jax.vmap(reachable))
+GROWN = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +81,7 @@ def test_children_are_graphs_within_their_ranges(bred: Genotype):
 
 
 def test_children_grow_and_are_not_all_the_same(bred: Genotype):
-    parts = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))(bred.graph)
+    parts = GROWN(bred.graph)
     count = np.asarray(parts.exists.sum(1))
     assert count.min() >= 1
     assert len(np.unique(count)) > 6
@@ -129,7 +130,7 @@ def test_what_is_grafted_is_connected_as_it_was(parents: tuple[Genotype, Genotyp
     """The father's nodes in their new places lead to his, and what found no room is not led to."""
     mother, father = (jax.tree.map(np.asarray, p) for p in parents)
     child = jax.tree.map(np.asarray, children("graft", parents))
-    free = ~np.asarray(jax.vmap(reachable)(mother.graph))
+    free = ~np.asarray(ALIVE(mother.graph))
     led, dropped = 0, 0
     for row in range(COUNT):
         # His first nodes take the free places in order.
@@ -181,6 +182,7 @@ def test_of_mutations_with_strengths_of_their_own_most_are_mild_and_few_are_stro
     assert 1 - same.mean() == pytest.approx(0.8 * 0.47, abs=0.05)
 
 
+@pytest.mark.thorough("a special case; test_a_mutation_changes_a_few_values has the usual numbers")
 def test_as_many_central_neurons_as_nodes_change_nothing_of_a_graphs_mutation():
     """They do not grow, so they do not count among the values of which a few change."""
     graphs = []
@@ -203,7 +205,10 @@ def test_nodes_and_connections_come_and_go(parents: tuple[Genotype, Genotype]):
     assert (alive < were).mean() > 0.03
 
 
-@pytest.mark.parametrize("drawn", [True, False])
+FREE = pytest.mark.thorough("other tests here have bodies that vary")
+
+
+@pytest.mark.parametrize("drawn", [True, pytest.param(False, marks=FREE)])
 def test_a_drawn_body_is_its_mothers(parents: tuple[Genotype, Genotype], drawn: bool):
     """Whatever befalls the child, and its brain still varies."""
     controller = Brains(0.01, BrainConfig())

@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 import pytest
-from helpers import small_config
+from helpers import made_up_judge, small_config
 
 from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import AdvanceRows
@@ -11,6 +11,7 @@ from mjxgait.distributed.recipe import Programs, Recipe
 from mjxgait.distributed.rows import Blocks, block_size
 from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.errors import UserError
+from mjxgait.training import experiment, stages
 from mjxgait.training.experiment import build_experiment
 
 CONFIG = small_config(rollout={"block": 3})
@@ -28,18 +29,32 @@ def test_what_cannot_be_cut_is_refused():
         block_size(251, 64)
 
 
-@pytest.mark.parametrize(
-    "promote",
-    [pytest.param(1.0, marks=pytest.mark.thorough("without promotion")), 0.5],
-    ids=["all", "the better half goes on"],
+SIMULATED = pytest.mark.thorough(
+    "the same without a simulation; a part of a row is simulated below"
 )
-def test_a_generation_by_blocks_is_that_of_one_program(stool: Creature, promote: float):
+
+
+@pytest.mark.parametrize(
+    ("promote", "simulated"),
+    [
+        (0.5, False),
+        pytest.param(0.5, True, marks=SIMULATED),
+        pytest.param(1.0, True, marks=pytest.mark.thorough("without promotion")),
+    ],
+    ids=["the better half goes on", "the better half goes on, simulated", "all, simulated"],
+)
+def test_a_generation_by_blocks_is_that_of_one_program(
+    stool: Creature, monkeypatch: pytest.MonkeyPatch, promote: float, simulated: bool
+):
     """Who was judged, in which order, and what it cost; terms to the rounding of another program."""
+    if not simulated:
+        for module in (stages, experiment):  # of whole populations, and of blocks
+            monkeypatch.setattr(module, "judge", made_up_judge)
     config = small_config(rollout={"block": 3, "promote": promote})
-    experiment = build_experiment(stool, config)
-    alone = experiment.compile()
-    spread = experiment.compile(Blocks(Scheduler(LocalBackend()), stool, config))
-    state = experiment.place(experiment.init())
+    run = build_experiment(stool, config)
+    alone = run.compile()
+    spread = run.compile(Blocks(Scheduler(LocalBackend()), stool, config))
+    state = run.place(run.init())
     (mine, counts), (theirs, others) = alone(state), spread(state)
     for one, other in zip(
         jax.tree.leaves(mine.genomes), jax.tree.leaves(theirs.genomes), strict=True

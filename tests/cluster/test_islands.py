@@ -1,12 +1,15 @@
-"""Populations that exchange their best, in this process: the same work as on a cluster, one hand."""
+"""Populations that exchange their best, in this process: the same work as on a cluster, one hand.
+
+Nothing is simulated here; `test_blocks` simulates what a worker does.
+"""
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import STOOL, said_by, small_config
+from helpers import STOOL, made_up_judge, said_by, small_config
 from rich.console import Console
 
 import mjxgait
@@ -16,11 +19,19 @@ from mjxgait.distributed import islands
 from mjxgait.distributed.recipe import Programs
 from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.inspect.sections import island_facts
+from mjxgait.training import stages
 from mjxgait.training.folder import Numbered, create_run, read_metrics, read_records
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import stored_generations
 
 PROGRAMS = Programs()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nothing_is_simulated() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stages, "judge", made_up_judge)
+        yield
 
 
 def config(**of_islands: Any):

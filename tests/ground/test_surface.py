@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers import small_config
 
+from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.creature.creature import start_place
 from mjxgait.creature.ground.surface import (
@@ -21,7 +22,7 @@ from mjxgait.creature.ground.surface import (
 )
 from mjxgait.evolution.chance import key_of
 from mjxgait.reference.terrain import terrain_of
-from mjxgait.tasks.starts import draw_starts
+from mjxgait.tasks.starts import Starts, draw_starts
 
 TEXTS = (
     "slope:0.2",
@@ -33,6 +34,11 @@ TEXTS = (
     "rough:0.1",
     "rough:0.1@5",
 )
+
+
+def drawn(creature: Creature, config: RolloutConfig) -> Starts:
+    """Compiled as a whole: its hundreds of operations would be compiled one by one."""
+    return jax.jit(lambda key: draw_starts(key, creature, config))(key_of(0))
 
 
 def laid(creature: Creature, text: str) -> Ground:
@@ -72,11 +78,12 @@ def test_uneven_ground_is_rough_ground_on_slopes(stool: Creature):
 def test_perturbed_starts_have_uneven_ground_of_their_own(stool: Creature):
     """The nominal one has none, whatever the others have: no two the same, none too steep."""
     config = dataclasses.replace(small_config().rollout, starts=6, slope=10.0)
-    ground = draw_starts(key_of(0), stool, config).ground
+    ground = drawn(stool, config).ground
     assert ground is not None
     far = 20 * stool.frame.body_length * jnp.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
     x, y = far + stool.frame.stand_pos[:2, None]
-    heights = np.asarray(jax.vmap(lambda each: height(each, x, y))(ground))
+    far_off = jax.jit(jax.vmap(lambda each: height(each, x, y)))
+    heights = np.asarray(far_off(ground))
     assert not heights[0].any()
     assert (np.abs(heights[1:]).max(1) > 0).all()
     steepest = np.tan(np.radians(10.0)) * 20 * stool.frame.body_length
@@ -85,8 +92,8 @@ def test_perturbed_starts_have_uneven_ground_of_their_own(stool: Creature):
     for direction in heights[1:, [0, 2, 3]].T:
         assert direction.min() < 0 < direction.max()
     rough = dataclasses.replace(config, slope=0.0, rough=0.1)
-    ground = draw_starts(key_of(0), stool, rough).ground
-    heights = np.asarray(jax.vmap(lambda each: height(each, x, y))(ground))
+    ground = drawn(stool, rough).ground
+    heights = np.asarray(far_off(ground))
     assert not heights[0].any()
     assert 0 < np.abs(heights).max() <= 0.1 * stool.frame.hip_height
 
@@ -133,19 +140,19 @@ def test_it_is_as_high_and_as_steep_as_asked(stool: Creature):
 
 def test_every_trial_has_ground_of_its_own_and_the_first_the_named_one(stool: Creature):
     config = small_config(rollout={"ground": "rough:0.1@5", "starts": 3}).rollout
-    ground = draw_starts(key_of(0), stool, config).ground
+    ground = drawn(stool, config).ground
     x, y = places(stool, 20.0)
     heights = jax.vmap(lambda each: height(each, x, y))(ground)
     np.testing.assert_allclose(heights[0], height(laid(stool, "rough:0.1@5"), x, y), atol=1e-6)
     assert np.abs(heights[1] - heights[2]).max() > 0.01
-    again = draw_starts(key_of(0), stool, config).ground
+    again = drawn(stool, config).ground
     for one, other in zip(jax.tree.leaves(ground), jax.tree.leaves(again), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 def test_other_draws_do_not_change_with_the_ground(stool: Creature):
     flat, rough = (
-        draw_starts(key_of(0), stool, small_config(rollout={"ground": text}).rollout)
+        drawn(stool, small_config(rollout={"ground": text}).rollout)
         for text in ("flat", "rough:0.1")
     )
     assert flat.ground is None
@@ -160,7 +167,7 @@ def test_a_sphere_is_as_far_away_as_the_nearest_point(stool: Creature, text: str
     assert theirs is not None
     radius, (x, y) = 0.03, places(stool, 6.0, 60)
     z = theirs.height(x, y) + np.random.default_rng(1).uniform(0.8, 1.5, 60) * radius
-    near = np.stack(np.meshgrid(*[np.linspace(-0.05, 0.05, 201)] * 2), -1).reshape(-1, 2).T
+    near = np.stack(np.meshgrid(*[np.linspace(-0.05, 0.05, 101)] * 2), -1).reshape(-1, 2).T
     px, py = x + near[0][:, None], y + near[1][:, None]
     apart = np.sqrt((px - x) ** 2 + (py - y) ** 2 + (theirs.height(px, py) - z) ** 2).min(0)
     found = contact(laid(stool, text), x, y, z, radius)

@@ -20,10 +20,17 @@ from mjxgait.cli.train import _layers
 from mjxgait.config.layers import find_creature, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.importer import ImportChoices, Imported, import_model
+from mjxgait.importer import ImportChoices, Imported, import_model, stance
 from mjxgait.importer.portrait import facts, portrait, standing
 from mjxgait.importer.write_toml import _quoted
 from mjxgait.reference.starts import perturbed_starts
+
+
+@pytest.fixture
+def a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The standing pose is sought a sixth as long, where it is not what a test looks at."""
+    monkeypatch.setattr(stance, "FIRST", 60)
+    monkeypatch.setattr(stance, "ROUNDS", 4)
 
 
 def bring(folder: Path, text: str, kind: str = "xml", **choices) -> tuple[Creature, Imported]:
@@ -86,6 +93,7 @@ def test_texts_come_back_from_creature_toml_as_they_were(text: str):
     assert tomllib.loads(f"name = {_quoted(text)}") == {"name": text}
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_a_body_shorter_than_its_legs_is_as_long_as_they_are(tmp_path):
     """Speeds are wanted and judged in body lengths; a biped measured from back to toes would be
     praised for shuffling.
@@ -96,6 +104,7 @@ def test_a_body_shorter_than_its_legs_is_as_long_as_they_are(tmp_path):
         assert creature.frame.body_length > 0.95 * creature.frame.hip_height
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path):
     """The rotor inertia of gym's ant is a hundred times what its weight needs: with gains from
     the weight alone it moves in slow motion.
@@ -135,6 +144,7 @@ def test_it_stands_with_the_strongest_balance_feedback(tmp_path, axis):
     )
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_mujoco_reads_the_same_masses_and_joints_from_both_files(tmp_path):
     creature, _ = bring(tmp_path, QUADRUPED)
     before = mujoco.MjModel.from_xml_string(QUADRUPED)
@@ -161,6 +171,7 @@ def test_a_urdf_biped_stands_without_its_meshes(tmp_path):
     assert creature.corrections.balance_roll[hip] != 0
 
 
+@pytest.mark.usefixtures("a_short_search")
 @pytest.mark.parametrize("missing", ["mass", "inertia", "all inertia"])
 def test_a_broken_inertia_is_mended_and_named(tmp_path, missing):
     broken = {
@@ -172,6 +183,7 @@ def test_a_broken_inertia_is_mended_and_named(tmp_path, missing):
     assert told(imported, 'inertia of link "left_thigh"')
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_degrees_in_a_urdf_are_read_as_degrees(tmp_path):
     creature, imported = bring(
         tmp_path, BIPED.replace('lower="-1.2" upper="1.2"', 'lower="-69" upper="69"'), "urdf"
@@ -227,6 +239,7 @@ def test_a_planar_walker_gets_wide_feet(tmp_path):
     assert creature.model.nv == 6 + 6
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_legs_that_leave_their_plane_do_not_pass_each_other(tmp_path):
     """Ankles that turn 4 degrees askew: it loads all the same, and says nothing of a plane."""
     creature, _ = bring(tmp_path, planar(ankle="0.07 1 0"))
@@ -260,6 +273,7 @@ def test_refusals_name_the_element_in_one_sentence(tmp_path, case):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_no_mesh_outside_the_model_s_folder_is_read(tmp_path):
     """The same file is used from inside and ignored outside, through a path, an absolute path
     and a link.
@@ -287,6 +301,7 @@ def test_no_mesh_outside_the_model_s_folder_is_read(tmp_path):
     assert not told(imported, "dropped: not found")
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_joints_are_kept_and_frozen_as_told(tmp_path):
     creature, _ = bring(tmp_path, QUADRUPED, keep=("neck",), freeze=("f*_knee",))
     assert "neck" in creature.joints.names
@@ -307,9 +322,15 @@ def test_the_command_writes_a_folder_and_check_draws_it(tmp_path, capsys):
     assert (tmp_path / "look.png").stat().st_size > 5000
 
 
+@pytest.mark.thorough("end_to_end/test_commands checks and draws each; the stool is drawn below")
 def test_every_shipped_creature_can_be_drawn(shipped):
     assert portrait(shipped).size == (1100, 760)
     assert shipped.name in facts(shipped, standing(shipped))[0]
+
+
+def test_a_creature_can_be_drawn_and_told_of(stool: Creature):
+    assert portrait(stool).size == (1100, 760)
+    assert stool.name in facts(stool, standing(stool))[0]
 
 
 def test_check_fails_where_the_creature_does_not_stand(tmp_path, capsys):

@@ -196,7 +196,7 @@ def test_whatever_happens_to_a_file_on_its_way_there_is_no_traceback(stool, tmp_
     whole = whole if isinstance(whole, bytes) else whole.encode()
     rng, file = np.random.default_rng(5), tmp_path / f"walk.{kind}"
     sentences = []
-    for case in range(45):
+    for case in range(30):
         data = bytearray(whole[: rng.integers(1, len(whole))] if case % 2 else whole)
         for place in rng.integers(0, len(data), 1 + case % 7):
             data[place] = rng.integers(0, 256)

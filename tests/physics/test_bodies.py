@@ -28,7 +28,7 @@ from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import Plant
 
-BODIES = 6
+BODIES, STEPS = 6, 80
 PLANTS = {"fast": fast_plant, "mjx": mjx_plant}
 TIGHT = {"fast": 1.0, "mjx": 50.0}
 """Factor on the tolerances of the fast physics: MJX loses more in single precision."""
@@ -58,6 +58,11 @@ def plant(request: pytest.FixtureRequest) -> Plant:
     """Made of a body that none of the lanes has."""
     model = mujoco.MjModel.from_xml_string(XML)
     return PLANTS[request.param](model, layout_of(model))
+
+
+ALONE = pytest.mark.thorough(
+    "test_each_is_what_it_is_in_c compares the same bodies, and test_fast_parity.py constants"
+)
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +131,7 @@ def test_each_geom_is_as_low_as_in_c(models: list[mujoco.MjModel], moment: Momen
             assert together[0].geom_low[lane, n] == pytest.approx(low, abs=1e-5)
 
 
+@ALONE
 def test_each_is_what_it_is_alone(
     plant: Plant, numbers: list[Any], moment: Moment, together: Any, tight: float
 ):
@@ -146,12 +152,28 @@ def test_each_is_what_it_is_alone(
             close(a[lane], b[0], 2e-5 * tight)
 
 
+def test_eighty_steps_are_those_of_c(
+    plant: Plant, models: list[mujoco.MjModel], numbers: list[Any], batch: Callable[..., Any]
+):
+    """Through impacts, each body with its own; to what float32 keeps of them."""
+    moment = moments(models, seed=2)
+    moment = dataclasses.replace(moment, torque=0.1 * moment.torque)
+    state, torque, damping = moment.for_plant(plant, stacked(numbers))
+    for _ in range(STEPS):
+        state = batch(state, torque, damping)[2]
+    theirs = [one_in_c(model, moment.of(lane), STEPS).qpos for lane, model in enumerate(models)]
+    apart = np.abs(in_front(plant, state.qpos) - theirs).max(axis=1)
+    assert np.median(apart) < 2e-3
+    assert apart.max() < 5e-2
+
+
 def test_a_lane_keeps_its_body(plant: Plant, numbers: list[Any], together: Any):
     after, before = together[2].parameters, stacked(numbers)
     for a, b in zip(jax.tree.leaves(after), jax.tree.leaves(before), strict=True):
         np.testing.assert_array_equal(a, np.float32(b))
 
 
+@ALONE
 def test_none_is_the_plants_own(
     plant: Plant, moment: Moment, batch: Callable[..., Any], tight: float
 ):
@@ -166,6 +188,7 @@ def test_none_is_the_plants_own(
         close(np.asarray(a), np.asarray(b), 2e-5 * tight)
 
 
+@pytest.mark.thorough("tests/test_inputs.py compares the programs of whole runs")
 def test_numbers_as_inputs_leave_one_program(plant: Plant, numbers: list[Any], moment: Moment):
     def text(parameters: Any) -> str:
         def program(parameters: Any, *arguments: Any) -> Any:
@@ -179,7 +202,8 @@ def test_numbers_as_inputs_leave_one_program(plant: Plant, numbers: list[Any], m
 
 def test_constants_make_a_program_each(plant: Plant, numbers: list[Any], moment: Moment):
     def text(parameters: Any) -> str:
-        program = everything(plant.with_parameters(parameters))
-        return jax.jit(program).lower(*moment.of(0).for_plant(plant)).as_text()
+        other = plant.with_parameters(parameters)
+        state = moment.of(0).for_plant(plant)[0]
+        return jax.jit(lambda state: other.forward(state)[0]).lower(state).as_text()
 
     assert text(numbers[0]) != text(numbers[1])

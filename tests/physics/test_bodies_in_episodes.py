@@ -37,10 +37,13 @@ class BodyPerStart(Simulator):
         return dataclasses.replace(lane, body=dataclasses.replace(lane.body, parameters=own))
 
 
-MJX = pytest.mark.thorough("test_bodies has MJX, a step at a time")
+pytestmark = pytest.mark.thorough(
+    "tests/test_evolve_body.py and tests/blocks/test_swimming.py compare episodes of bodies that "
+    "differ with C MuJoCo, and test_bodies.py compares their steps"
+)
 
 
-@pytest.fixture(scope="module", params=["auto", pytest.param("mjx", marks=MJX)])
+@pytest.fixture(scope="module", params=["auto", "mjx"])
 def tallies(request: pytest.FixtureRequest, stool: Creature) -> tuple[Tally, list[Tally]]:
     """Of three starts with three bodies, together; and of all starts with each body."""
     settings = {"physics": request.param, "lanes": 2, "starts": len(BODIES), "terminate": False}

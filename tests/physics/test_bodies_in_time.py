@@ -1,13 +1,11 @@
-"""Lanes with bodies of their own for many steps, among them a shipped quadruped's variants."""
-
-import dataclasses
+"""Lanes with bodies of their own for many steps: a shipped quadruped's variants."""
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from many_bodies import XML, compiled, layout_of, moments, one_in_c, stacked, varied
+from many_bodies import compiled, stacked
 
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
@@ -29,21 +27,6 @@ def after(plant: Plant, state: BodyState, torque: jax.Array, steps: int) -> np.n
     return np.asarray(compiled(program, state)(state).qpos).T
 
 
-def test_eighty_steps_are_those_of_c():
-    """Through impacts, each body with its own; to what float32 keeps of them."""
-    models = [varied(XML, seed) for seed in range(10, 18)]
-    plant = fast_plant(mujoco.MjModel.from_xml_string(XML), layout_of(models[0]))
-    numbers = stacked([plant.parameters_of(model, layout_of(model)) for model in models])
-    moment = moments(models, seed=2)
-    state, torque, _ = moment.for_plant(plant, numbers)
-    ours = after(plant, state, 0.1 * torque, 80)
-    moment = dataclasses.replace(moment, torque=0.1 * moment.torque)
-    theirs = [one_in_c(model, moment.of(lane), 80).qpos for lane, model in enumerate(models)]
-    apart = np.abs(ours - theirs).max(axis=1)
-    assert np.median(apart) < 2e-3
-    assert apart.max() < 5e-2
-
-
 @pytest.fixture(scope="module")
 def quadrupeds() -> list[mujoco.MjModel]:
     """The tall quadruped with its parts' masses, armatures and lengths changed."""
@@ -60,7 +43,7 @@ def quadrupeds() -> list[mujoco.MjModel]:
     return variants
 
 
-@pytest.mark.thorough("another body")
+@pytest.mark.thorough("test_bodies.py has eighty steps of another body")
 def test_a_shipped_quadruped_whose_body_is_varied(quadrupeds: list[mujoco.MjModel]):
     creature = load_creature(find_creature("tall_quadruped"))
     layout = sense_layout(creature)

@@ -49,6 +49,11 @@ def tall_stool(tmp_path_factory: pytest.TempPathFactory) -> Creature:
     )
 
 
+@pytest.fixture(scope="module")
+def plants(stool: Creature) -> dict[str, Any]:
+    return {physics: make_plant(stool, physics, True)[0] for physics in SAID}
+
+
 HIP = '<joint name="hind_left_hip"/>'
 FOOT = '<geom name="hind_left_foot" type="sphere" pos="0 0 -0.27" size="0.03"/>'
 OTHERS = {
@@ -77,16 +82,15 @@ SAID = {
 
 
 @pytest.mark.parametrize("what", OTHERS)
-@pytest.mark.parametrize("physics", SAID)
 def test_a_user_is_told_why_a_creature_needs_a_program_of_its_own(
-    physics: Any, what: str, stool: Creature, tmp_path: Path
+    plants: dict[str, Any], what: str, tmp_path: Path
 ):
-    plant, _ = make_plant(stool, physics, True)
     other = stool_with(tmp_path / "other", OTHERS[what])
-    with pytest.raises(UserError) as told:
-        parameters_of(plant, other, True)
-    assert str(told.value).startswith("stool needs a program of its own")
-    assert str(told.value).endswith(f"another: {SAID[physics][what]}")
+    for physics, plant in plants.items():
+        with pytest.raises(UserError) as told:
+            parameters_of(plant, other, True)
+        assert str(told.value).startswith("stool needs a program of its own")
+        assert str(told.value).endswith(f"another: {SAID[physics][what]}")
 
 
 def test_names_are_no_part_of_a_topology():
@@ -109,26 +113,27 @@ def lying(creature: Creature, bodies: int) -> BodyState:
 
 
 @pytest.mark.parametrize("physics", ["auto", "mjx"])
-def test_overlap_is_that_of_the_lanes_own_body(physics: Any, stool: Creature, tall_stool: Creature):
-    plant, _ = make_plant(stool, physics, True)
+def test_overlap_is_that_of_the_lanes_own_body(
+    physics: str, plants: dict[str, Any], stool: Creature, tall_stool: Creature
+):
+    """Which is that of lanes with the same body."""
+    plant = plants[physics]
     both = [parameters_of(plant, creature, True) for creature in (stool, tall_stool)]
-    state = lying(stool, 2)
-
-    def depths(plant: Any, state: BodyState) -> np.ndarray:
-        placed = jax.tree.map(
-            lambda x: jnp.moveaxis(jnp.asarray(x, jnp.float32), 0, plant.lane_axis), state
+    placed = [
+        jax.tree.map(
+            lambda x: jnp.moveaxis(jnp.asarray(x, jnp.float32), 0, plant.lane_axis),
+            dataclasses.replace(lying(stool, 2), parameters=stacked(bodies)),
         )
-        return np.asarray(compiled(plant.overlap, placed)(placed))
-
-    together = depths(plant, dataclasses.replace(state, parameters=stacked(both)))
-    alone = [depths(plant.with_parameters(each), state) for each in both]
+        for bodies in (both, both[:1] * 2, both[1:] * 2)
+    ]
+    depths = compiled(plant.overlap, placed[0])
+    together, *alone = [np.asarray(depths(state)) for state in placed]
     np.testing.assert_allclose(together, np.diagonal(alone), atol=1e-6)
     assert np.abs(alone[0] - alone[1]).min() > 1e-3
 
 
-def test_a_longer_body_is_only_other_numbers(stool: Creature, tall_stool: Creature):
-    plant, _ = make_plant(stool, "auto", True)
-    numbers = parameters_of(plant, tall_stool, True)
+def test_a_longer_body_is_only_other_numbers(plants: dict[str, Any], tall_stool: Creature):
+    numbers = parameters_of(plants["auto"], tall_stool, True)
     assert numbers.contacts.radius == pytest.approx([0.035] * 4)
     assert numbers.contacts.center[:, 2] == pytest.approx([-0.324] * 4)
     own, _ = make_plant(tall_stool, "auto", True)

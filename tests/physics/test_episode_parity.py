@@ -77,7 +77,7 @@ def starts_of(creature: Creature, films: list[Outcome]) -> Starts:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *wanted)
 
 
-MJX = pytest.mark.thorough("test_fast_parity compares the fast step with MJX")
+MJX = pytest.mark.thorough("test_ground_parity.py compares the fast step with MJX")
 
 
 @pytest.fixture(

@@ -241,6 +241,7 @@ def test_one_step(scene: Scene, result: Any) -> None:
         _close(result[2].qvel[:, lane], data.qvel)
 
 
+@pytest.mark.thorough("test_ground_parity.py compares all that both plants give of another body")
 def test_like_mjx(scene: Scene, result: Any) -> None:
     """MJX computes in float32 too: wider tolerances."""
     in_front = jax.tree.map(

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from conftest import SHIPPED
 from helpers import STOOL, small_config
 
 from mjxgait.creature import Creature, load_creature
@@ -156,6 +157,13 @@ def test_who_stands_in_himself_is_judged_by_what_comes_on_top(tmp_path: Path):
     assert pair_depths(pairs, *bar_places(wide.model, wide.stand_qpos, pairs)).max() <= 1e-9
 
 
+MORE = pytest.mark.thorough("the crab and the lamp show it")
+CREATURES = [
+    name if name in ("crab", "luxo") else pytest.param(name, marks=MORE) for name in SHIPPED
+]
+
+
+@pytest.mark.parametrize("shipped", CREATURES, indirect=True)
 def test_the_pairs_are_the_same_each_time_and_no_neighbours(shipped: Creature):
     pairs, again = find_crossings(shipped), find_crossings(shipped)
     assert 0 < len(pairs.first) <= 256
@@ -310,22 +318,21 @@ def test_a_walker_whose_legs_cross_is_seen_and_nobody_else(stool: Creature):
     """On fewer lanes than individuals, one whose legs meet among others that stand still."""
     from mjxgait.training.experiment import build_experiment
 
-    experiment = build_experiment(
-        stool, small_config(rollout={"lanes": 3, "starts": 1, "physics": "mjx"})
-    )
+    experiment = build_experiment(stool, small_config(rollout={"lanes": 3}))
     low, high = experiment.simulator.controller.bounds(experiment.config.controller)
     signs = np.array([1.0 if "front" in name else -1.0 for name in stool.joints.names])
     standing = np.broadcast_to(stool.joints.stand, low.key_poses.shape)
-    poses = np.stack([standing] * 5)
+    poses = np.stack([standing] * 7)
     poses[2] = np.where(signs > 0, high.key_poses, low.key_poses)
     genomes = dataclasses.replace(
         low,
         **{
-            field.name: jnp.stack([getattr(low, field.name)] * 5)
+            field.name: jnp.stack([getattr(low, field.name)] * 7)
             for field in dataclasses.fields(low)
         },
     )
     genomes = dataclasses.replace(genomes, key_poses=jnp.asarray(poses, jnp.float32))
-    depth = jax.jit(experiment.simulate)(genomes).tally.overlap[:, 0]
-    assert depth[2] > 0.001
-    assert (np.delete(np.asarray(depth), 2) == 0).all()
+    # The same program as that of test_rollout.py.
+    depth = jax.jit(experiment.simulate)(genomes, experiment.starts).tally.overlap
+    assert (depth[2] > 0.001).all()
+    assert (np.delete(np.asarray(depth), 2, axis=0) == 0).all()

@@ -47,15 +47,15 @@ def lowest_after(creature: Creature, touch_ends: bool) -> float:
     assert isinstance(plant, FastPlant)
     limp = jnp.zeros((creature.model.nv, 1), jnp.float32)
 
-    def step(_: int, state: BodyState) -> BodyState:
-        _, workings = plant.forward(state)
-        return plant.advance(state, workings, limp)
+    def step(state: BodyState) -> tuple[jax.Array, BodyState]:
+        sensed, workings = plant.forward(state)
+        return jnp.min(sensed.geom_low), plant.advance(state, workings, limp)
 
-    steps = round(SECONDS / creature.model.opt.timestep)
-    start = on_its_back(creature)
-    fall = jax.jit(lambda state: jax.lax.fori_loop(0, steps, step, state)).lower(start)
-    end = fall.compile(compiler_options=SLIM)(start)
-    return float(jnp.min(plant.forward(end)[0].geom_low))
+    state = on_its_back(creature)
+    program = jax.jit(step).lower(state).compile(compiler_options=SLIM)
+    for _ in range(round(SECONDS / creature.model.opt.timestep)):
+        low, state = program(state)
+    return float(low)
 
 
 def test_a_creature_on_its_back_rests_on_the_floor(round_stool: Creature):

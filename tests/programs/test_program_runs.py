@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import SHORT, STOOL, said_by
+from programs.small_run import small_settings
 
 import mjxgait
 from mjxgait.certification.trials import simulate
@@ -27,21 +28,12 @@ from mjxgait.training.folder import CHAMPION, METRICS, read_metrics
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> mjxgait.Run:
-    settings = {
-        "controller": {"nodes": 32, "senses": ["a*", "t", "v?", "pitch"]},
-        "rollout": {"seconds": 0.2, "lanes": 8},
-        "examination": {"candidates": 0},
-        # The best of three generations, which move most: more of them agree than of the last alone.
-        "evolution": {"survival": "best", "elite": 0.0, "remember": False, "selection": "rank"},
-    }
-    settings["rollout"] |= {"variety": 1, "caution": 0.0, "worst": 0.5}
     return mjxgait.train(
         STOOL,
         out=tmp_path_factory.mktemp("programs") / "run",
         controller="program",
-        population=8,
         generations=2,
-        settings=settings,
+        settings=small_settings(),
         quiet=True,
     )
 

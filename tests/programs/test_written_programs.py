@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers import SHORT, STOOL, said_by
+from programs.small_run import TABLES
 
 import mjxgait
 from mjxgait.config.layers import find_creature
@@ -185,13 +186,13 @@ def test_where_bodies_evolve_written_programs_begin_on_the_creatures_own(
     assert genomes.sizes[1].any()
 
 
-def trained(out: Path, file: Path, *more: object, generations: int = 2) -> tuple[object, ...]:
+def trained(out: Path, file: Path, *more: object, generations: int = 1) -> tuple[object, ...]:
     """The command that evolves a stool from the programs of a file."""
-    small = "--population 6 --rollout.seconds 0.2 --rollout.lanes 6 --controller.nodes 32"
-    rest = "--examination.candidates 0 --no-plots"
+    settings = out.parent / "small.toml"
+    settings.write_text(TABLES)
     begin = ("train", "--env", STOOL, "--controller", "program", "--expressions", file)
     limit = ("--generations", generations, "--out", out)
-    return (*begin, *small.split(), *rest.split(), *limit, *more)
+    return (*begin, "--config", settings, *limit, "--no-plots", *more)
 
 
 FOUR = "(list 0.1 (* 0.3 (- 0 t)) (% a0 2) 0.2)\n"
@@ -200,15 +201,23 @@ FOUR = "(list 0.1 (* 0.3 (- 0 t)) (% a0 2) 0.2)\n"
 def test_a_run_holds_its_programs_and_resumes_without_the_file(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ):
+    """All places of the first generation are given ones, and none is lost before it is judged."""
     file = tmp_path / "mine.txt"
-    file.write_text(FOUR)
-    said_by(capsys, *trained(tmp_path / "whole", file), code=0)
-    said_by(capsys, *trained(tmp_path / "parts", file, generations=1), code=0)
+    texts = [f"(list 0.1 0.{i} (/ a0 2) (* t 0.{i}))" for i in range(1, 9)]
+    file.write_text("\n".join(texts).replace("/", "%"))
+    all_of_them = ("--evolution.initial-choice", 1)
+    said_by(capsys, *trained(tmp_path / "whole", file, *all_of_them), code=0)
+    begin = trained(tmp_path / "parts", file, *all_of_them, generations=0)
+    said_by(capsys, *begin, code=0)
     file.unlink()
+    begun = mjxgait.open(tmp_path / "parts")
+    genomes = read_snapshot(begun.folder).arrays
+    pairs = zip(genomes["genomes.code"], genomes["genomes.value"], strict=True)
+    assert sorted(program_text(begun.creature, pair) for pair in pairs) == texts
     resumed = ("train", "--resume", tmp_path / "parts", "--no-plots")
-    said_by(capsys, *resumed, "--generations", 2, code=0)
+    said_by(capsys, *resumed, "--generations", 1, code=0)
     whole, parts = (mjxgait.open(tmp_path / name) for name in ("whole", "parts"))
-    assert whole.config.controller.expressions == ("(list 0.1 (* 0.3 (- 0 t)) (/ a0 2) 0.2)",)
+    assert whole.config.controller.expressions == tuple(texts)
     assert whole.champion.fingerprint == parts.champion.fingerprint
     lines = [read_metrics(run.folder / METRICS) for run in (whole, parts)]
     assert [line["best"] for line in lines[0]] == [line["best"] for line in lines[1]]
@@ -216,35 +225,10 @@ def test_a_run_holds_its_programs_and_resumes_without_the_file(
     assert "a resumed run keeps the programs" in said_by(capsys, *told, code=2)
 
 
-def test_programs_take_part_in_the_first_generation(tmp_path: Path):
-    """All places are given ones, and none is lost before it is judged."""
-    file = tmp_path / "mine.txt"
-    texts = [f"(list 0.1 0.{i} 0.2 (* t 0.{i}))" for i in range(1, 7)]
-    file.write_text("\n".join(texts))
-    run = mjxgait.train(
-        STOOL,
-        out=tmp_path / "run",
-        controller="program",
-        expressions=file,
-        population=6,
-        generations=0,
-        settings={
-            "controller": {"nodes": 32},
-            "rollout": {"seconds": 0.2, "lanes": 6},
-            "evolution": {"initial_choice": 1},
-            "examination": {"candidates": 0},
-        },
-        quiet=True,
-    )
-    genomes = read_snapshot(run.folder).arrays
-    pairs = zip(genomes["genomes.code"], genomes["genomes.value"], strict=True)
-    assert sorted(program_text(run.creature, pair) for pair in pairs) == texts
-
-
 @pytest.mark.parametrize(
     ("content", "more", "words"),
     [
-        (FOUR.encode() * 7, (), "7 programs, and a population of 6; take --population 7"),
+        (FOUR.encode() * 9, (), "9 programs, and a population of 8; take --population 9"),
         (FOUR.encode("utf-16"), (), "is not text in UTF-8"),
         (b"", (), "holds no program"),
         (None, (), "no such file"),

@@ -1,6 +1,9 @@
 """A repertoire of the smallest creature as its commands would leave it: nobody evolves or examines it."""
 
 import dataclasses
+import functools
+import shutil
+import tempfile
 from pathlib import Path
 
 from helpers import STOOL
@@ -33,7 +36,17 @@ CERTIFIED = (Cell(0.2, 0.0), Cell(0.2, 10.0))
 
 
 def begin(folder: Path) -> tuple[Path, Creature, Grid]:
-    settings = folder.with_suffix(".toml")
+    """A copy of a repertoire that was begun once for all tests of a process: it draws many poses."""
+    made, grid = _begun()
+    shutil.copytree(Path(made.name) / "set", folder)
+    return folder, open_run(folder / grid.cells[0].name)[0], grid
+
+
+@functools.cache
+def _begun() -> tuple[tempfile.TemporaryDirectory, Grid]:
+    """A folder that stays as long as the process."""
+    made = tempfile.TemporaryDirectory(prefix="mjxgait-repertoire-")
+    settings = Path(made.name) / "set.toml"
     settings.write_text(SMALL)
     plan = planned(
         RepertoireOptions(
@@ -41,13 +54,13 @@ def begin(folder: Path) -> tuple[Path, Creature, Grid]:
             speeds=("0.2", "0.4"),
             turns=(10.0,),
             config=str(settings),
-            out=folder,
+            out=Path(made.name) / "set",
             population=6,
             generations=GENERATIONS,
         )
     )
     begin_repertoire(plan)
-    return folder, open_run(folder / plan.grid.cells[0].name)[0], plan.grid
+    return made, plan.grid
 
 
 def certificate(creature: Creature, passed: bool) -> str:

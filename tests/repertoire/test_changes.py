@@ -1,6 +1,8 @@
 """From one walk into another while it walks: told at several moments, each on its own."""
 
 import dataclasses
+import pickle
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,6 @@ from mjxgait.creature import Creature
 from mjxgait.experiments.repertoire import neighbours
 from mjxgait.experiments.repertoire.found import Found
 from mjxgait.experiments.repertoire.neighbours import (
-    MOMENTS,
     SECONDS,
     changes,
     succeeds,
@@ -26,7 +27,23 @@ from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.walk import record_walk
 
 LARGE, SMALL = 35.0, 30.0
+MOMENTS = 3
+"""At which a change is told; as shipped they are more, and each is simulated for 13 s."""
 CHANGES = np.array([1.0, 1.5, np.inf])
+
+
+@pytest.fixture(autouse=True)
+def few_moments(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(neighbours, "MOMENTS", MOMENTS)
+
+
+def one_by_one(work: Callable, ways: Sequence, tell: Callable[[int, int], object], **_) -> list:
+    """In place of `one_per_core`: work that another process could do, in this process."""
+    found = []
+    for number, way in enumerate(ways, 1):
+        found.append(pickle.loads(pickle.dumps(work))(pickle.loads(pickle.dumps(way))))
+        tell(number, len(ways))
+    return found
 
 
 def film(creature: Creature, before: Champion, after: Champion, seconds: float = 3.0) -> Trajectory:
@@ -111,8 +128,11 @@ def test_headings_turn_as_the_one_walk_does_and_then_as_the_other(stool: Creatur
     np.testing.assert_allclose(back[0, 201:], back[0, -1])
 
 
-def test_neighbours_change_there_and_back(stool: Creature, tmp_path: Path):
+def test_neighbours_change_there_and_back(
+    stool: Creature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """Straight on and in a curve: who does not look where it is told has not changed."""
+    monkeypatch.setattr(neighbours, "one_per_core", one_by_one)
     folder, creature, grid = begin(tmp_path / "set")
     examine(folder, creature, grid)
     found = [Found(cell, cell in CERTIFIED, 0.2, 0.0, 0.5, "trot", 0.3, ()) for cell in grid.cells]

@@ -15,6 +15,7 @@ from mjxgait.experiments.repertoire.clips import (
     IDLE,
     PLACES,
     RESTS,
+    Transition,
     halted,
     start_of,
     stop_of,
@@ -39,12 +40,23 @@ def loops(walk: Walk) -> dict[str, WalkLoop]:
     return {"walk": stride_in_phase(walk, RATE)}
 
 
+@pytest.fixture(scope="module")
+def start(walk: Walk, loops: dict[str, WalkLoop]) -> Transition:
+    return start_of(walk, "walk", loops)
+
+
+@pytest.fixture(scope="module")
+def stop(walk: Walk, loops: dict[str, WalkLoop]) -> Transition:
+    return stop_of(walk, "walk", loops)
+
+
 def joints(walk: Walk, qpos: np.ndarray) -> np.ndarray:
     return qpos[..., walk.creature.joints.qpos_adr]
 
 
-def test_a_start_leads_from_standing_into_the_stride(walk: Walk, loops: dict[str, WalkLoop]):
-    start = start_of(walk, "walk", loops)
+def test_a_start_leads_from_standing_into_the_stride(
+    walk: Walk, loops: dict[str, WalkLoop], start: Transition
+):
     assert (start.name, start.begins, start.ends) == ("walk_start", IDLE, "walk")
     first, last = joints(walk, start.loop.qpos[[0, -1]])
     np.testing.assert_allclose(first, walk.creature.joints.stand, atol=0.01)
@@ -53,8 +65,9 @@ def test_a_start_leads_from_standing_into_the_stride(walk: Walk, loops: dict[str
     assert max(start.gaps) < 0.05
 
 
-def test_a_stop_leads_from_the_stride_to_a_stand(walk: Walk, loops: dict[str, WalkLoop]):
-    stop = stop_of(walk, "walk", loops)
+def test_a_stop_leads_from_the_stride_to_a_stand(
+    walk: Walk, loops: dict[str, WalkLoop], stop: Transition
+):
     assert (stop.name, stop.begins, stop.ends) == ("walk_stop", "walk", IDLE)
     first, last = joints(walk, stop.loop.qpos[[0, -1]])
     off = first - joints(walk, loops["walk"].qpos[0])
@@ -65,18 +78,21 @@ def test_a_stop_leads_from_the_stride_to_a_stand(walk: Walk, loops: dict[str, Wa
     assert np.abs(rests - rests[-1]).max() < 0.02
 
 
-def test_where_clips_meet_the_trunk_is_in_the_same_place(walk: Walk, loops: dict[str, WalkLoop]):
+def test_where_clips_meet_the_trunk_is_in_the_same_place(
+    loops: dict[str, WalkLoop], start: Transition, stop: Transition
+):
     """Above the root, which is where the other clip has ended or will begin."""
     begins = loops["walk"].qpos[0, :2]
     assert np.abs(begins).max() > 1e-3
-    start, stop = (of(walk, "walk", loops).loop.qpos[:, :2] for of in (start_of, stop_of))
-    for found, wanted in ((start[0], 0), (start[-1], begins), (stop[0], begins), (stop[-1], 0)):
+    first, last = (motion.loop.qpos[:, :2] for motion in (start, stop))
+    for found, wanted in ((first[0], 0), (first[-1], begins), (last[0], begins), (last[-1], 0)):
         np.testing.assert_allclose(found, wanted, atol=1e-12)
 
 
-def test_the_root_of_the_file_moves_as_the_body_moved(walk: Walk, loops: dict[str, WalkLoop]):
+def test_the_root_of_the_file_moves_as_the_body_moved(
+    walk: Walk, loops: dict[str, WalkLoop], start: Transition
+):
     """In place too, where the walks have a root that stands."""
-    start = start_of(walk, "walk", loops)
     frames = round(start.loop.times[-1] / walk.time_step)
     moved = (walk.qpos[frames, :2] - walk.qpos[0, :2]) - loops["walk"].qpos[0, :2]
     np.testing.assert_allclose(start.loop.path[-1], moved, atol=0.005)
@@ -116,14 +132,13 @@ def test_who_is_told_to_stop_walks_until_then_and_stands_after(walk: Walk):
         assert np.ptp(film.phase[row, at + 1 :]) == 0
 
 
-def test_of_the_ways_to_stop_the_soonest_is_taken(walk: Walk, loops: dict[str, WalkLoop]):
+def test_of_the_ways_to_stop_the_soonest_is_taken(walk: Walk, stop: Transition):
     moments = np.linspace(2.0, 2.4, PLACES)
     motions = halted(walk, moments)
     assert len(motions) == PLACES * len(FADES)
     lasts = [len(motion) for motion in motions if len(motion)]
     assert min(lasts) >= (moments[0] + min(FADES)) / walk.time_step
     assert len(set(lasts)) > 1
-    stop = stop_of(walk, "walk", loops)
     assert stop.loop.times[-1] < (max(lasts) - moments[0] / walk.time_step) * walk.time_step
 
 

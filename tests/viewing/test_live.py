@@ -143,6 +143,7 @@ def test_a_port_that_is_taken_is_said(site, run):
         open_server(Watcher(run), int(address.rsplit(":", 1)[1]))
 
 
+@pytest.mark.thorough("the page that follows a training is the same command, and is ended too")
 def test_the_command_tells_its_address_and_ends(run):
     viewer = subprocess.Popen(
         [sys.executable, "-m", "mjxgait", "view", str(run)], stdout=subprocess.PIPE, text=True

@@ -1,0 +1,33 @@
+"""A process that measures champions by 1 s of walking, and is killed once, as by a full memory.
+
+A file of its own, since the processes that measure import it by its name.
+"""
+
+import os
+import signal
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from mjxgait.experiments.ablation import rows
+from mjxgait.experiments.ablation.rows import Judged
+
+LAST = "2-0.json"
+"""The champion at which the process is killed."""
+JUDGE = rows._judge
+
+
+def judge(
+    creature: Path, grounds: Sequence[str], examine: bool, champion: Path, finite: bool
+) -> Judged:
+    """In place of `rows._judge`: killed once, after a result of another champion is on disk."""
+    rows.SECONDS, study = 1.0, creature.parent
+    killed = study.with_name(f"{study.name}-was-killed")
+    if champion.name == LAST and not killed.exists():
+        killed.touch()
+        measured, until = study / rows.MEASURED, time.monotonic() + 60
+        while not measured.exists() or measured.read_bytes().count(b"\n") < 1:
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGKILL)
+    return JUDGE(creature, grounds, examine, champion, finite)
