@@ -202,7 +202,9 @@ def differences(stored: Document, again: Document) -> list[str]:
 
     Seconds, attempts and numbers without a criterion do not count.
     """
-    named: dict[str, tuple[object, object]] = {key: (stored.get(key), again[key]) for key in IDENTITY}
+    named: dict[str, tuple[object, object]] = {
+        key: (stored.get(key), again[key]) for key in IDENTITY
+    }
     named["ground"] = (stored.get("report", {}).get("ground"), again["report"]["ground"])
     found = [f"{key}: {one}, again {two}" for key, (one, two) in named.items() if one != two]
     found += _measures(criteria_of(stored), criteria_of(again))

@@ -54,8 +54,8 @@ TRAINED = {
     **dict.fromkeys(("jump", "follow"), "tests/blocks/test_roaming.py"),
     "travel": "tests/test_travel.py",
 }
-"""Tasks that another test evolves, and where. Of the last three that test compares parts with the
-examiner; `--thorough` evolves them.
+"""Tasks that another test evolves, and where. Of those of test_roaming.py it evaluates individuals on
+land, and compares parts of the others with the examiner; `--thorough` evolves them.
 """
 EVOLVED = [way for way in first_of_each_task(WAYS) if task_of(way) not in TRAINED]
 
