@@ -140,7 +140,7 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(weighed: Experiment):
         np.testing.assert_array_equal(leaf[1], one)
 
 
-@pytest.mark.thorough("tests/physics/test_bodies_in_episodes.py has bodies that walk differently")
+@pytest.mark.thorough("test_evolve_body.py has a body per lane in episodes")
 def test_where_the_masses_count_everybody_moves_otherwise(weighed: Experiment):
     """Nothing else tells the starts apart."""
     forward = jax.jit(weighed.simulate)(weighed.init().genomes).tally.forward
