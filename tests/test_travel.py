@@ -8,12 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from certify_made_up import walk
-from test_hop import HORIZON, REACH, STEP, moment, reaching
+from test_hop import ALIKE, HORIZON, REACH, STEP, moment
 
 from mjxgait.certification import CertificateConfig
 from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.trials import simulate
 from mjxgait.creature import Creature
+from mjxgait.plugins.registry import build_config
+from mjxgait.plugins.user_code import load
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.starts import nominal_starts
@@ -26,6 +28,7 @@ from mjxgait.tasks.hop.config import (
 )
 from mjxgait.tasks.hop.task import Aim, Travel
 from mjxgait.tasks.hop.thresholds import TravelConfig as Demanded
+from mjxgait.training.experiment import build_experiment
 
 CONFIG, DEMANDS = CertificateConfig(), acceptance_of("travel")
 
@@ -92,8 +95,14 @@ def test_a_controller_is_told_the_same_moving_goals(
     """Strides of a few millimetres, so that all are reached in a fraction of a second."""
     monkeypatch.setattr(Travel, "goals", (0.004, 0.012))
     monkeypatch.setattr(Travel, "nominal", 0.008)
-    source = REACH.replace("0.4 * plan", "40.0 * plan")
-    experiment = reaching(stool, tmp_path, "travel", source)
+    file = tmp_path / "reach.py"
+    file.write_text(REACH.replace("0.4 * plan", "40.0 * plan"))
+    table = {
+        "use": {"task": "travel", "controller": load("controller", f"{file}:Reach")},
+        "evolution": {"population": 6},
+        "rollout": {"seconds": 0.4, "starts": 3, "promote": 1.0, "lanes": 4, **ALIKE},
+    }
+    experiment = build_experiment(stool, build_config(table, "test"))
     state = experiment.init()
     tally = jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
     best = int(tally.reached.sum(1).argmax())

@@ -20,11 +20,13 @@ from mjxgait.kinds import tasks
 from mjxgait.plugins import resolve_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import find
+from mjxgait.tasks.plain import PlainTask
 
 ROOT = Path(__file__).parents[2]
 CREATURES, CONFIGS = shipped_creatures(), shipped_configs()
 TASKS = [name for name, kind in tasks().items() if not kind.called]
 """By the names that a user gives them."""
+SMALLEST_WALKER = "short_quadruped"
 STYLES = sorted(path.stem for path in (data_folder("configs") / "styles").glob("*.toml"))
 STUDIES = sorted(path.stem for path in (data_folder("configs") / "ablations").glob("*.toml"))
 BENCHMARKS = sorted(path.name for path in (ROOT / "benchmarks").glob("*.py"))
@@ -103,8 +105,13 @@ def _fits(creature: Creature, task: str) -> bool:
 
 
 def _akin(creature: Creature, task: str, own: str) -> bool:
-    """Bodies that grow have all tasks that fit. A task of another body is its own or derives from it."""
-    return creature.settings.creature.grows or issubclass(find("task", task), find("task", own))
+    """Bodies that grow have all tasks that fit. A task of another body is its own or derives from it,
+    or is a plain one, which the smallest walker does.
+    """
+    kind = find("task", task)
+    if creature.settings.creature.grows or issubclass(kind, find("task", own)):
+        return True
+    return issubclass(kind, PlainTask) and creature.name == SMALLEST_WALKER
 
 
 def smallest(names: list[str]) -> str:
