@@ -43,7 +43,7 @@ def test_reads_where_other_devices_are(finished_run):
     """How long it takes is a figure of benchmarks/inspect_seconds.py, not of a test."""
     done = subprocess.run(
         [sys.executable, "-m", "mjxgait", "inspect", str(finished_run), "--json"],
-        env=os.environ | {"XLA_FLAGS": "--xla_force_host_platform_device_count=3"},
+        env=os.environ | {"JAX_NUM_CPU_DEVICES": "3"},
         capture_output=True,
         text=True,
         check=True,
