@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 import pygltflib as gltf
 import pytest
-from conftest import SHIPPED
 from viewing.made_up import treading
 
 from mjxgait.animation.export import RATES, build_glb, walk_loop
@@ -34,14 +33,12 @@ KIND = {
 
 ALWAYS = ("crab", "luxo")
 """One with many legs, and one that has a single one and shapes of its own."""
+OTHERS = ("alien", "duck", "short_quadruped", "tall_quadruped")
 
 
 @pytest.fixture(
     scope="module",
-    params=[
-        name if name in ALWAYS else pytest.param(name, marks=pytest.mark.thorough("a body more"))
-        for name in SHIPPED
-    ],
+    params=[*ALWAYS, *(pytest.param(n, marks=pytest.mark.thorough("a body more")) for n in OTHERS)],
 )
 def loop(request):
     creature = load_creature(find_creature(request.param))
