@@ -17,6 +17,7 @@ import numpy as np
 
 from mjxgait.creature.bars import Bar, bars_of
 from mjxgait.creature.creature import Creature
+from mjxgait.latest import Latest
 
 NEAR = 0.1
 """Hip heights; joints nearer to each other count as one place, like the three of an Euler hip."""
@@ -95,16 +96,10 @@ def find_crossings(creature: Creature) -> Crossings:
 
     The search takes up to half a second, so the latest results are kept.
     """
-    key = _search_key(creature)
-    if key not in _KEPT:
-        if len(_KEPT) == MOST_KEPT:
-            del _KEPT[next(iter(_KEPT))]
-        _KEPT[key] = _search(creature)
-    return _KEPT[key]
+    return _FOUND.find(_search_key(creature), lambda: _search(creature))
 
 
-_KEPT: dict[bytes, Crossings] = {}
-MOST_KEPT = 32
+_FOUND: Latest[Crossings] = Latest(32)
 
 
 def _search_key(creature: Creature) -> bytes:

@@ -14,11 +14,12 @@ import jax
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
+from mjxgait.latest import Latest
 from mjxgait.plugins import build_config
 from mjxgait.plugins.user_code import is_loaded, load, loaded
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.blueprint import Plan, draw_up
-from mjxgait.training.experiment import Batch, Latest, Shape, Step, build_batch, shape_of
+from mjxgait.training.experiment import Batch, Shape, Step, build_batch, shape_of
 from mjxgait.training.stages import CompiledGeneration, Turn, at_once, compiled
 from mjxgait.types import Asked, Judged
 

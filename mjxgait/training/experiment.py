@@ -1,11 +1,9 @@
 """Experiment and batch: one or several runs assembled from creature and config."""
 
-import collections
 import dataclasses
 import hashlib
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from functools import cached_property, partial
-from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -60,26 +58,6 @@ def shape_of(creature: Creature, config: Config) -> Shape:
     """Return the program key of a creature's run under a config."""
     code = (find("controller", config.use.controller), find("task", config.use.task))
     return Shape(creature.digest, traced_structure(config), code)
-
-
-T = TypeVar("T")
-
-
-class Latest(collections.OrderedDict[Hashable, T]):
-    """Cache of the `count` values used last."""
-
-    def __init__(self, count: int) -> None:
-        super().__init__()
-        self._count = count
-
-    def find(self, key: Hashable, make: Callable[[], T]) -> T:
-        """Return the value of a key; make it if it is missing."""
-        if key not in self:
-            self[key] = make()
-            while len(self) > self._count:
-                self.popitem(last=False)
-        self.move_to_end(key)
-        return self[key]
 
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]

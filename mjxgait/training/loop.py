@@ -22,11 +22,12 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.files import write_text
+from mjxgait.latest import Latest
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.tasks.base import Task
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.examination import Examined, Examiner, Exams, Validation, why_ended
-from mjxgait.training.experiment import Experiment, Latest, Step, build_experiment
+from mjxgait.training.experiment import Experiment, Step, build_experiment
 from mjxgait.training.folder import (
     BODY,
     CERTIFICATE,
