@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certification.criteria import speed
+from mjxgait.certification.config import GaitConfig
+from mjxgait.certification.criteria import Measure, at_most, speed
 from mjxgait.reference.measure import (
     Dimensions,
     Recording,
@@ -49,6 +50,11 @@ def buzz(window: Recording) -> float:
     width = max(round(BAND / spacing), 1)
     bands = sums[width:] - sums[:-width]
     return float(np.sqrt(bands.max(initial=0.0) / (speed**2).mean(0).mean()))
+
+
+def vibration(window: Recording, config: GaitConfig) -> Measure:
+    """Compare the strongest vibration of a joint with its threshold."""
+    return at_most("buzz of a joint / joint speed", buzz(window), config.buzz)
 
 
 def _power(speed: np.ndarray, step: float) -> np.ndarray:

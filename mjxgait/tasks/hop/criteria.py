@@ -10,7 +10,7 @@ from typing_extensions import override
 from mjxgait.certification.acceptance import Unasked, to_the_end
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, at_least, at_most, parts, physics
-from mjxgait.certification.describe import buzz, worst_overlap
+from mjxgait.certification.describe import vibration, worst_overlap
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording
@@ -290,8 +290,8 @@ class TravelCriteria(GoalCriteria):
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """See `AcceptanceCriteria`: as for all tasks with a goal, and 7: no motion by vibration."""
-        shakes = at_most("buzz of a joint / joint speed", buzz(whole), config.gait.buzz)
-        return (*super().undisturbed(whole, halved, config), Criterion(7, "gait", (shakes,)))
+        gait = Criterion(7, "gait", (vibration(whole, config.gait),))
+        return (*super().undisturbed(whole, halved, config), gait)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """See `AcceptanceCriteria`: distance travelled, and number of goals."""

@@ -8,7 +8,7 @@ from typing_extensions import override
 from mjxgait.certification.acceptance import PlainCriteria, to_the_end
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, at_least, at_most
-from mjxgait.certification.describe import buzz
+from mjxgait.certification.describe import vibration
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording
 
@@ -18,8 +18,6 @@ HALF = 0.7
 """Least turn in the second half of the time over the turn in the first."""
 AWAY = 2.0
 """Largest distance from the start in hip heights."""
-VIBRATION = CertificateConfig().gait.buzz
-"""As for walks."""
 
 
 class TurnCriteria(PlainCriteria):
@@ -39,7 +37,7 @@ class TurnCriteria(PlainCriteria):
         kept = second / first if first > 0 else np.nan
         away = np.linalg.norm(window.trunk_pos[:, :2] - window.trunk_pos[0, :2], axis=1)
         near = away.max() / window.dimensions.hip_height
-        shakes = at_most("buzz of a joint / joint speed", buzz(window), VIBRATION)
+        shakes = vibration(window, CertificateConfig().gait)
         return (
             Criterion(
                 10,

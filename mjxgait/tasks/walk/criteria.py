@@ -32,12 +32,12 @@ from mjxgait.certification.criteria import (
 )
 from mjxgait.certification.describe import (
     amplitudes_apart,
-    buzz,
     describe,
     duties_apart,
     patter,
     sides,
     slip_distance,
+    vibration,
 )
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import (
@@ -251,7 +251,7 @@ def _manner(window: Recording, config: GaitConfig, wish: Wish) -> tuple[Measure,
     """Measures of criterion 7 that detect vibration and a limp."""
     measures = (
         at_most("flicker of a foot per stride", patter(window), config.flicker),
-        at_most("buzz of a joint / joint speed", buzz(window), config.buzz),
+        vibration(window, config),
     )
     if not two_like_sides(wish, window.dimensions):
         return measures
