@@ -139,14 +139,15 @@ def planned(options: RepertoireOptions) -> Planned:
     grid = Grid.of([speed_of(text, creature) for text in options.speeds], options.turns)
     base = _settings(options, creature)
     check(base)
-    folder = options.out or Path("runs") / f"repertoire-{creature.name}"
-    configs = {cell: settings_of(cell, grid, creature, base) for cell in grid.cells}
     check_parts(creature, base)
+    folder = options.out or Path("runs") / f"repertoire-{creature.name}"
     if is_taken(folder):
         raise UserError(
             f"{folder}: holds something already; name another folder with --out, or go on with "
             f"--resume {folder}"
         )
+    # Last, for it draws many poses.
+    configs = {cell: settings_of(cell, grid, creature, base) for cell in grid.cells}
     return Planned(folder, creature, grid, configs)
 
 

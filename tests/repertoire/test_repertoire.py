@@ -154,7 +154,6 @@ def test_a_resumed_repertoire_keeps_its_walks(finished, capsys: pytest.CaptureFi
 
 def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture):
     (tmp_path / "mine.txt").write_text("mine")
-    few = ("--speeds", 0.2, "--turns", 10)
-    said = said_by(capsys, "repertoire", "--env", STOOL, *few, "--out", tmp_path, code=2)
+    said = said_by(capsys, "repertoire", "--env", STOOL, "--out", tmp_path, code=2)
     assert "holds something already" in said
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
