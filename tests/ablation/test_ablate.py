@@ -10,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from functools import partial
@@ -26,6 +27,7 @@ from mjxgait.cli import main
 from mjxgait.distributed import evolve
 from mjxgait.distributed.recipe import Programs
 from mjxgait.distributed.scheduler import LocalBackend
+from mjxgait.errors import INTERRUPTED
 from mjxgait.experiments.ablation import findings, rows
 from mjxgait.training import stages
 from mjxgait.training.checkpoint import Checkpoints, Packed
@@ -270,6 +272,25 @@ def test_a_study_killed_twice_ends_as_one_that_was_not(
     mjxgait_of_its_own("ablate", study, "--out", tmp_path / "whole")
     for name in ("results.csv", "generations.parquet"):
         assert (tmp_path / "whole" / name).read_bytes() == (killed_twice / name).read_bytes()
+
+
+def test_ctrl_c_in_the_last_generation_ends_a_study_before_it_measures(
+    finished: tuple[Path, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Its runs are complete, and what would come next takes minutes too."""
+    copy = shutil.copytree(finished[0], tmp_path / "copy")
+    (copy / rows.MEASURED).unlink()
+
+    @contextlib.contextmanager
+    def interrupted() -> Iterator[threading.Event]:
+        event = threading.Event()
+        event.set()
+        yield event
+
+    monkeypatch.setattr(rows, "interruptible", interrupted)
+    said = ended("ablate", "--resume", copy, code=INTERRUPTED)[0]
+    assert f"go on with: mjxgait ablate --resume {copy}" in said
+    assert not (copy / rows.MEASURED).exists()
 
 
 def test_a_study_that_would_take_days_is_refused_with_the_estimate(

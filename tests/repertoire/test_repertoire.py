@@ -16,6 +16,7 @@ from made_up_hands import Interrupted, Pretend
 from repertoire.made_up import CERTIFIED, GENERATIONS, begin, examine
 from viewing.made_up import treading
 
+from mjxgait.cli import repertoire as command
 from mjxgait.creature import Creature
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.experiments.repertoire.grid import POSES, Cell, Grid, evolve, mirrored
@@ -152,7 +153,11 @@ def test_a_resumed_repertoire_keeps_its_walks(finished, capsys: pytest.CaptureFi
     assert "keeps its walks and their settings" in said
 
 
-def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture):
+def test_nothing_is_overwritten(
+    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+):
+    # A repertoire that starts all the same ends here, not after 25 walks.
+    monkeypatch.setattr(command, "begin", lambda plan: pytest.fail("the folder was accepted"))
     (tmp_path / "mine.txt").write_text("mine")
     said = said_by(capsys, "repertoire", "--env", STOOL, "--out", tmp_path, code=2)
     assert "holds something already" in said
