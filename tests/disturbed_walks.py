@@ -13,7 +13,7 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.reference import starts as examined
 from mjxgait.reference.outcome import Fall, Outcome
-from mjxgait.tasks.walk.stats import Tally
+from mjxgait.tasks.walk.stats import EpisodeStats
 
 STEP, SECONDS = 0.005, 1.2
 STEPS = round(SECONDS / STEP)
@@ -160,8 +160,8 @@ TOLERANCE = COUNTS | dict.fromkeys(EXACT, 0)
 UNCOMPARED = {
     "overlap": "looked at every 16 steps only; tests/physics/test_overlap.py holds it against C"
 }
-"""Fields of the tally that have no counterpart in `recorded_tally`, with the reason."""
-FIELDS = [field.name for field in dataclasses.fields(Tally) if field.name not in UNCOMPARED]
+"""Fields of the statistics that have no counterpart in `recorded_stats`, with the reason."""
+FIELDS = [field.name for field in dataclasses.fields(EpisodeStats) if field.name not in UNCOMPARED]
 
 
 def tolerance(name: str, value: np.ndarray | float) -> float:

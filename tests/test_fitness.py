@@ -1,4 +1,4 @@
-"""Every fitness term by hand from a made-up tally, and what becomes of the terms."""
+"""Every fitness term by hand from made-up statistics, and what becomes of the terms."""
 
 import dataclasses
 
@@ -78,9 +78,9 @@ def body(stool: Creature) -> Creature:
     return altered(stool, frame={"body_length": 1.0, "hip_height": 0.5, "mass": 20.0})
 
 
-def terms_of(body: Creature, tally: dict, **fitness: float) -> dict[str, float]:
+def terms_of(body: Creature, stats: dict, **fitness: float) -> dict[str, float]:
     config = small_config(fitness={"speed": 0.0, **fitness}).fitness
-    arrays = {name: jnp.asarray(value) for name, value in (LIVED | tally).items()}
+    arrays = {name: jnp.asarray(value) for name, value in (LIVED | stats).items()}
     filled = dataclasses.replace(Judge(body, STEP, HORIZON // 2).init(), **arrays)
     terms = fitness_terms(body, config, STEP, HORIZON, filled)
     return {name: float(value) for name, value in terms.items()}
@@ -102,12 +102,12 @@ def at_rest(body: Creature, low: jax.Array) -> Sensed:
     )
 
 
-IDS = [f"{name} of {' and '.join(tally) or 'a whole walk'}" for name, _, tally in CASES]
+IDS = [f"{name} of {' and '.join(stats) or 'a whole walk'}" for name, _, stats in CASES]
 
 
-@pytest.mark.parametrize(("name", "value", "tally"), CASES, ids=IDS)
-def test_a_term_is_what_its_tally_says(body: Creature, name: str, value: float, tally: dict):
-    assert terms_of(body, tally)[name] == pytest.approx(value, rel=1e-4, abs=1e-5)
+@pytest.mark.parametrize(("name", "value", "stats"), CASES, ids=IDS)
+def test_a_term_is_what_its_statistics_say(body: Creature, name: str, value: float, stats: dict):
+    assert terms_of(body, stats)[name] == pytest.approx(value, rel=1e-4, abs=1e-5)
 
 
 @pytest.mark.parametrize("name", TERMS)
@@ -120,18 +120,18 @@ def test_every_term_has_a_case_that_is_not_zero(name: str):
 def test_a_case_changes_no_other_penalty(body: Creature):
     """What is counted for one term is not counted for a second one."""
     shared = {"distance", "alive", "fade", "clearance", "duty"}
-    for name, _, tally in CASES:
-        if set(tally) & {"steps", "forward"}:
+    for name, _, stats in CASES:
+        if set(stats) & {"steps", "forward"}:
             continue
-        plain, changed = terms_of(body, {}), terms_of(body, tally)
+        plain, changed = terms_of(body, {}), terms_of(body, stats)
         differ = {term for term in TERMS if changed[term] != pytest.approx(plain[term])}
         assert differ <= {name} | shared, name
 
 
 def test_style_counts_by_the_share_of_the_wanted_walk(body: Creature):
     """2 m are four ninths of 5 s at 0.9 lengths a second; distance and a foot's height are no style."""
-    tally = {"tilt": 120.0, "foot_height": 200.0, "airborne": 150.0}
-    terms = terms_of(body, tally, speed=0.9)
+    stats = {"tilt": 120.0, "foot_height": 200.0, "airborne": 150.0}
+    terms = terms_of(body, stats, speed=0.9)
     assert terms["tilt"] == pytest.approx(0.12 * 4 / 9, rel=1e-4)
     assert terms["airborne"] == pytest.approx(0.15 * 4 / 9, rel=1e-4)
     assert terms["foot_height"] == pytest.approx(0.15, rel=1e-4)
@@ -141,8 +141,8 @@ def test_style_counts_by_the_share_of_the_wanted_walk(body: Creature):
 @pytest.mark.parametrize(("forward", "counts"), [(0.0, 0.25), (2.0, 0.25 + 0.75 * 4 / 9), (9.0, 1)])
 def test_staying_up_counts_for_more_the_farther_one_walks(body, forward, counts):
     """Where the wanted way is 4.5 m: who stands still must not be better than who walks."""
-    tally = {"steps": 500, "forward": forward}
-    assert terms_of(body, tally, speed=0.9)["alive"] == pytest.approx(0.5 * counts, rel=1e-4)
+    stats = {"steps": 500, "forward": forward}
+    assert terms_of(body, stats, speed=0.9)["alive"] == pytest.approx(0.5 * counts, rel=1e-4)
 
 
 def test_each_weight_meets_its_own_term_with_its_own_sign():
@@ -166,10 +166,10 @@ def test_a_task_counts_what_its_settings_say(body: Creature):
         task = Walk.told(body, STEP, HORIZON, body.settings.termination, settings)
         assert ("foot_speed" in task.terms) == bool(whip)
         touching = jnp.full(len(body.feet.watched), 0.001)
-        tally = task.update(
+        stats = task.update(
             task.init(), at_rest(body, touching), jnp.zeros(len(body.joints.names)), 0.1, ()
         )
-        assert np.all(tally.contact == down)
+        assert np.all(stats.contact == down)
 
 
 def test_the_score_is_the_weighted_sum_of_each_start():

@@ -32,7 +32,7 @@ from mjxgait.tasks.hop.config import (
 from mjxgait.tasks.hop.stats import (
     STYLE,
     TERMS,
-    Tally,
+    EpisodeStats,
     away,
     empty,
     fitness_terms,
@@ -112,21 +112,21 @@ def test_the_goal_is_sensed_along_the_starts_forward_axis(stool: Creature):
         assert float(value) == pytest.approx(left, abs=1e-6)
 
 
-# The tally
+# The statistics
 
 
-def after(creature: Creature, moments: list[Sensed], goal: float = 1.0) -> Tally:
-    tally = empty(creature, HORIZON)
+def after(creature: Creature, moments: list[Sensed], goal: float = 1.0) -> EpisodeStats:
+    stats = empty(creature, HORIZON)
     for sensed in moments:
-        tally = updated(creature, STEP, tally, sensed, jnp.float32(goal))
-    return jax.device_get(tally)
+        stats = updated(creature, STEP, stats, sensed, jnp.float32(goal))
+    return jax.device_get(stats)
 
 
 def test_arrival_is_the_first_step_near_the_goal(stool: Creature):
     way = [0.0, 0.5, 0.94, 0.96, 1.2, 1.0]
-    tally = after(stool, [moment(stool, forward) for forward in way])
-    assert (tally.steps, tally.arrived) == (6, 3)
-    assert tally.left == pytest.approx(0.0, abs=1e-6)
+    stats = after(stool, [moment(stool, forward) for forward in way])
+    assert (stats.steps, stats.arrived) == (6, 3)
+    assert stats.left == pytest.approx(0.0, abs=1e-6)
     assert after(stool, [moment(stool, 0.5)] * 6).arrived == HORIZON
 
 
@@ -194,11 +194,11 @@ def test_who_has_not_moved_for_long_enough_is_at_the_end(stool: Creature, motion
         ([moves, *still], HORIZON),
         ([*still[:2], moves, *still[:2]], 5),
     ):
-        tally = after(stool, moments)
-        ended = rested(tally, HORIZON, rests, touching)
+        stats = after(stool, moments)
+        ended = rested(stats, HORIZON, rests, touching)
         assert (ended.steps, ended.ground) == (steps, steps - len(moments))
-        assert rested(tally, HORIZON, never, touching).steps == len(moments)
-        assert rested(tally, HORIZON, rests, ~touching).ground == 0
+        assert rested(stats, HORIZON, never, touching).steps == len(moments)
+        assert rested(stats, HORIZON, rests, ~touching).ground == 0
 
 
 # The terms
@@ -247,10 +247,10 @@ CASES: list[tuple[str, float, dict]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "value", "tally"), CASES)
-def test_a_term_is_what_its_tally_says(stool: Creature, name: str, value: float, tally: dict):
+@pytest.mark.parametrize(("name", "value", "stats"), CASES)
+def test_a_term_is_what_its_statistics_say(stool: Creature, name: str, value: float, stats: dict):
     body = altered(stool, frame={"hip_height": 0.5, "mass": 2.0, "body_length": 1.0})
-    arrays = {key: jnp.asarray(number) for key, number in tally.items()}
+    arrays = {key: jnp.asarray(number) for key, number in stats.items()}
     filled = dataclasses.replace(empty(body, HORIZON), **arrays)
     assert float(fitness_terms(body, HORIZON, filled)[name]) == pytest.approx(value, abs=1e-5)
 
@@ -259,12 +259,12 @@ def test_every_term_has_a_case_that_is_not_zero():
     assert {name for name, value, _ in CASES if value} == set(TERMS)
 
 
-def tallied(task: Hop, moments: list[Sensed], torques: list[list[float]]) -> Tally:
-    tally = task.init()
+def tallied(task: Hop, moments: list[Sensed], torques: list[list[float]]) -> EpisodeStats:
+    stats = task.init()
     for sensed, torque in zip(moments, torques, strict=True):
         standards = task.standards(task.settings)
-        tally = task.update(tally, sensed, jnp.array(torque), standards, jnp.float32(1.0))
-    return jax.device_get(tally)
+        stats = task.update(stats, sensed, jnp.array(torque), standards, jnp.float32(1.0))
+    return jax.device_get(stats)
 
 
 def test_work_and_sub_goals_are_watched_only_where_they_count(stool: Creature):
@@ -276,15 +276,15 @@ def test_work_and_sub_goals_are_watched_only_where_they_count(stool: Creature):
     ends, settings = stool.settings.termination, HopConfig(sub_goals=(0.25, 0.5))
     off = Hop(stool, STEP, HORIZON, ends, settings)
     assert set(TERMS) - set(off.terms) == {"energy", "sub_goals"}
-    tally = tallied(off, moments, torques)
-    assert (tally.work, tally.closest) == (None, None)
+    stats = tallied(off, moments, torques)
+    assert (stats.work, stats.closest) == (None, None)
     weights = HopWeights(energy=0.1, sub_goals=0.2)
     on = Hop(stool, STEP, HORIZON, ends, dataclasses.replace(settings, weights=weights))
     assert set(on.terms) == set(TERMS)
-    tally = tallied(on, moments, torques)
-    assert tally.work == pytest.approx((3.0 + 2.0) * STEP)
-    assert tally.closest == pytest.approx([0.25, 0.1], abs=1e-6)
-    judged = on.judge(tally, on.settings)
+    stats = tallied(on, moments, torques)
+    assert stats.work == pytest.approx((3.0 + 2.0) * STEP)
+    assert stats.closest == pytest.approx([0.25, 0.1], abs=1e-6)
+    judged = on.judge(stats, on.settings)
     assert set(judged) == set(on.terms)
     counted = on.weights(on.settings, jnp.int32(10))
     # Style, at half of its ramp.
@@ -357,41 +357,41 @@ def experiment(stool: Creature, tmp_path_factory: pytest.TempPathFactory) -> Exp
 
 
 @pytest.fixture(scope="module")
-def evaluated(experiment: Experiment) -> tuple[EvolutionState, Tally]:
-    """The first population, and the tally [6, 3] of its trials."""
+def evaluated(experiment: Experiment) -> tuple[EvolutionState, EpisodeStats]:
+    """The first population, and the statistics [6, 3] of its trials."""
     state = experiment.init()
-    return state, jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
+    return state, jax.device_get(jax.jit(experiment.simulate)(state.genomes).stats)
 
 
 def test_every_episode_is_judged_by_its_own_goal(experiment: Experiment, evaluated):
-    _, tally = evaluated
+    _, stats = evaluated
     goals = np.asarray(experiment.starts.goal)
     assert len(set(goals.tolist())) == 3
-    np.testing.assert_array_equal(tally.goal, np.tile(goals, (6, 1)))
-    way = tally.goal - tally.left
+    np.testing.assert_array_equal(stats.goal, np.tile(goals, (6, 1)))
+    way = stats.goal - stats.left
     # In two fifths of a second nobody gets far, and nobody stays where it was.
     assert (np.abs(way) < 0.4).all()
     assert np.abs(way).max() > 1e-3
 
 
 def test_evolution_weighs_energy_and_sub_goals_where_they_have_a_weight(evaluated):
-    _, tally = evaluated
-    assert (tally.work > 0).all()
+    _, stats = evaluated
+    assert (stats.work > 0).all()
     # In two fifths of a second all are nearest to the first point, and near neither.
-    assert tally.closest.shape == (6, 3, 2)
-    assert (tally.closest[..., 0] < tally.closest[..., 1]).all()
-    assert (tally.closest[..., 0] > 0).all()
+    assert stats.closest.shape == (6, 3, 2)
+    assert (stats.closest[..., 0] < stats.closest[..., 1]).all()
+    assert (stats.closest[..., 0] > 0).all()
 
 
 def test_evolution_and_examiner_tell_a_controller_the_same_goals(
     stool: Creature, experiment: Experiment, evaluated
 ):
-    state, tally = evaluated
+    state, stats = evaluated
     starts = nominal_starts(stool, 3)
     starts.goal[:] = experiment.starts.goal
     # The first two touch the floor a step earlier in one precision than in the other.
-    way = (tally.goal - tally.left)[2]
-    # The tally has seen the state before the last step.
+    way = (stats.goal - stats.left)[2]
+    # The statistics include the state before the last step.
     path = simulate(stool, experiment.champion(state, {}, 2), starts, 0.4).path[:, -2]
     np.testing.assert_allclose(way, path, atol=1e-4)
     assert np.ptp(path) > 1e-2

@@ -119,9 +119,9 @@ def test_the_motion_is_that_of_the_bodys_own_program(stool: Creature, tmp_path: 
     def with_numbers(numbers: Numbers) -> jax.Array:
         simulator = given.blueprint.simulator(numbers)
         alone = jax.tree.map(lambda leaf: leaf[None], genomes)
-        return simulator.simulate(alone, rows.starts, rows.settings).tally.forward[0]
+        return simulator.simulate(alone, rows.starts, rows.settings).stats.forward[0]
 
     found = with_numbers(its.blueprint.numbers)
-    expected = jax.jit(own.simulate)(genomes).tally.forward
+    expected = jax.jit(own.simulate)(genomes).stats.forward
     np.testing.assert_allclose(found, expected, atol=1e-4)
     assert np.abs(found - with_numbers(given.blueprint.numbers)).max() > 1e-3

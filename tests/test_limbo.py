@@ -164,27 +164,27 @@ def test_the_bar_is_sensed(luxo: Creature):
 def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creature):
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     moments = [sensed(luxo, posed(luxo, ahead)) for ahead in (0.0, 0.5, 1.4)]
-    tally, standards = task.init(), task.standards(LimboConfig(height=HEIGHT))
+    stats, standards = task.init(), task.standards(LimboConfig(height=HEIGHT))
     aim = Aim(goal=jnp.float32(1.4), raised=jnp.float32(0.03))
     for moment in moments:
-        tally = task.update(tally, moment, jnp.zeros(3), standards, aim)
-    assert float(tally.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
+        stats = task.update(stats, moment, jnp.zeros(3), standards, aim)
+    assert float(stats.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
     # The bar that it would have stayed beneath, and none lower than its own.
-    needed = float(task.outcome(tally)["bar"])
+    needed = float(task.outcome(stats)["bar"])
     assert needed == pytest.approx(HEIGHT + depth(luxo, posed(luxo, 0.5)))
-    unhurt = dataclasses.replace(tally, bar=jnp.zeros(()))
+    unhurt = dataclasses.replace(stats, bar=jnp.zeros(()))
     assert float(task.outcome(unhurt)["bar"]) == pytest.approx(HEIGHT)
     # What counts is how deep it is in the bar where that is now.
-    deep = (float(tally.bar) - 0.03) / luxo.frame.hip_height
-    terms = task.judge(tally, LimboConfig())
+    deep = (float(stats.bar) - 0.03) / luxo.frame.hip_height
+    terms = task.judge(stats, LimboConfig())
     assert float(terms["bar"]) == pytest.approx(deep / 0.3, rel=1e-4)
-    above = task.judge(dataclasses.replace(tally, raised=jnp.float32(0.2)), LimboConfig())
+    above = task.judge(dataclasses.replace(stats, raised=jnp.float32(0.2)), LimboConfig())
     assert float(above["bar"]) == 0.0
-    tally = dataclasses.replace(tally, raised=jnp.float32(0.0))
-    terms = task.judge(tally, LimboConfig())
-    deep = float(tally.bar) / luxo.frame.hip_height
+    stats = dataclasses.replace(stats, raised=jnp.float32(0.0))
+    terms = task.judge(stats, LimboConfig())
+    deep = float(stats.bar) / luxo.frame.hip_height
     assert float(terms["bar"]) == pytest.approx(min(deep / 0.3, 1.0), rel=1e-5)
-    clear = task.judge(dataclasses.replace(tally, bar=jnp.zeros(())), LimboConfig())
+    clear = task.judge(dataclasses.replace(stats, bar=jnp.zeros(())), LimboConfig())
     assert float(clear["bar"]) == 0.0
     assert all(float(clear[name]) == float(terms[name]) for name in task.terms if name != "bar")
 

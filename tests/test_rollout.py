@@ -85,11 +85,11 @@ def episodes(experiment: Experiment) -> Episodes:
 
 
 def test_every_genome_is_judged_on_every_start(experiment: Experiment, episodes: Episodes):
-    assert episodes.tally.steps.shape == (7, 2)
-    assert (episodes.tally.steps > 0).all()
-    finished = episodes.tally.reason == Reason.FINISHED
-    assert (episodes.tally.steps[finished] == experiment.simulator.steps).all()
-    assert episodes.computed_steps >= episodes.tally.steps.sum()
+    assert episodes.stats.steps.shape == (7, 2)
+    assert (episodes.stats.steps > 0).all()
+    finished = episodes.stats.reason == Reason.FINISHED
+    assert (episodes.stats.steps[finished] == experiment.simulator.steps).all()
+    assert episodes.computed_steps >= episodes.stats.steps.sum()
 
 
 @pytest.mark.parametrize(
@@ -100,24 +100,24 @@ def test_results_do_not_depend_on_lanes_devices_or_turns(
 ):
     """Other batch sizes may round differently in float32; half a second of simulation keeps that below a tenth of a millimetre."""
     other = simulate(with_lanes(experiment, lanes, devices), genomes(experiment, 7))
-    assert np.allclose(other.tally.forward, episodes.tally.forward, atol=1e-4)
-    assert (other.tally.steps == episodes.tally.steps).all()
+    assert np.allclose(other.stats.forward, episodes.stats.forward, atol=1e-4)
+    assert (other.stats.steps == episodes.stats.steps).all()
 
 
 def test_the_order_of_results_is_the_order_of_the_genomes(
     experiment: Experiment, episodes: Episodes
 ):
     backwards = simulate(experiment, jax.tree.map(lambda leaf: leaf[::-1], genomes(experiment, 7)))
-    assert np.allclose(backwards.tally.forward[::-1], episodes.tally.forward, atol=1e-4)
+    assert np.allclose(backwards.stats.forward[::-1], episodes.stats.forward, atol=1e-4)
 
 
 def test_a_bad_individual_does_not_touch_its_neighbours(experiment: Experiment, episodes: Episodes):
     population = genomes(experiment, 7)
     poisoned = dataclasses.replace(population, key_poses=population.key_poses.at[3].set(jnp.nan))
     found = simulate(experiment, poisoned)
-    assert (found.tally.reason[3] == Reason.NONFINITE).all()
+    assert (found.stats.reason[3] == Reason.NONFINITE).all()
     others = [0, 1, 2, 4, 5, 6]
-    assert np.allclose(found.tally.forward[others], episodes.tally.forward[others], atol=1e-4)
+    assert np.allclose(found.stats.forward[others], episodes.stats.forward[others], atol=1e-4)
 
 
 def test_not_finite_means_the_lowest_score(experiment: Experiment):
@@ -160,7 +160,7 @@ def start_at(experiment: Experiment, height: float = 0.0, roll: float = 0.0) -> 
     ],
 )
 def test_an_episode_ends_at_once_and_says_why(experiment: Experiment, start: dict, reason: Reason):
-    found = simulate(experiment, genomes(experiment, 7), start_at(experiment, **start)).tally
+    found = simulate(experiment, genomes(experiment, 7), start_at(experiment, **start)).stats
     assert (found.reason == reason).all()
     assert (found.steps == 0).all()
     assert (found.forward == 0).all()
@@ -236,7 +236,7 @@ def test_the_dead_are_not_judged_on(experiment: Experiment):
     """Whatever a body does after its episode has ended: here it stands well again."""
     simulator, starts = experiment.simulator, experiment.starts
     creature, fast = experiment.creature, jnp.full(3, 2.0)
-    tally = dataclasses.replace(simulator.task.init(), steps=jnp.int32(7), forward=jnp.float32(0.3))
+    stats = dataclasses.replace(simulator.task.init(), steps=jnp.int32(7), forward=jnp.float32(0.3))
     start = jax.tree.map(lambda leaf: leaf[0], starts)
     lane = SimpleNamespace(
         aim=simulator.task.aim(start),
@@ -247,28 +247,28 @@ def test_the_dead_are_not_judged_on(experiment: Experiment):
 
     @jax.jit
     def after(reason: jax.Array, steps: jax.Array) -> object:
-        lane.tally = dataclasses.replace(tally, reason=reason, steps=steps)
+        lane.stats = dataclasses.replace(stats, reason=reason, steps=steps)
         return simulator._judge(lane, sensed, torque)
 
     alive = after(jnp.int32(Reason.FINISHED), jnp.int32(7))
     assert alive.steps == 8
     assert alive.reason == Reason.FINISHED
     for reason, steps in ((Reason.TIPPED, 7), (Reason.FINISHED, simulator.steps)):
-        known = dataclasses.replace(tally, reason=jnp.int32(reason), steps=jnp.int32(steps))
+        known = dataclasses.replace(stats, reason=jnp.int32(reason), steps=jnp.int32(steps))
         found = after(known.reason, known.steps)
         jax.tree.map(np.testing.assert_array_equal, found, known)
 
 
 @pytest.mark.thorough("test_the_dead_are_not_judged_on asks the same of one step")
-def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
+def test_death_freezes_the_statistics(experiment: Experiment, stool: Creature):
     """A longer episode adds nothing to an individual that has died."""
     long = build_experiment(stool, small_config(rollout={"lanes": 3, "seconds": 0.8}))
     population = genomes(long, 7)
     leaning = start_at(experiment, height=0.1, roll=0.9)
     starts = dataclasses.replace(leaning, qvel=leaning.qvel.at[:, 3].set(6.0))
     first, second = (
-        simulate(experiment, population, starts).tally,
-        simulate(long, population, starts).tally,
+        simulate(experiment, population, starts).stats,
+        simulate(long, population, starts).stats,
     )
     died = np.asarray(first.reason != Reason.FINISHED)
     assert died.any()
@@ -300,12 +300,12 @@ def standing_terms(experiment: Experiment) -> dict[str, float]:
     poses = jnp.broadcast_to(
         jnp.asarray(experiment.creature.joints.stand, jnp.float32), still.key_poses.shape
     )
-    tally = jax.tree.map(
+    stats = jax.tree.map(
         lambda leaf: leaf[0, 0],
-        simulate(experiment, dataclasses.replace(still, key_poses=poses)).tally,
+        simulate(experiment, dataclasses.replace(still, key_poses=poses)).stats,
     )
     terms = fitness_terms(
-        experiment.creature, experiment.config.fitness, 0.005, experiment.simulator.steps, tally
+        experiment.creature, experiment.config.fitness, 0.005, experiment.simulator.steps, stats
     )
     return {name: float(value) for name, value in terms.items()}
 
@@ -327,12 +327,12 @@ def test_style_counts_in_proportion_to_the_walk(experiment: Experiment):
     )
     enough = config.speed * horizon * 0.005 * creature.frame.body_length
     for share in (0.0, 0.5, 1.0):
-        tally = dataclasses.replace(
+        stats = dataclasses.replace(
             experiment.simulator.task.init(),
             steps=jnp.int32(horizon),
             forward=jnp.float32(share * enough),
         )
-        terms = fitness_terms(creature, config, 0.005, horizon, tally)
+        terms = fitness_terms(creature, config, 0.005, horizon, stats)
         assert float(terms["clearance"]) == pytest.approx(share, abs=1e-5)
 
 
@@ -343,13 +343,13 @@ def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
         experiment.simulator.steps,
     )
     lengths = config.speed * horizon * 0.005
-    tally = dataclasses.replace(
+    stats = dataclasses.replace(
         experiment.simulator.task.init(),
         forward=jnp.float32(3 * lengths * creature.frame.body_length),
     )
-    term = float(fitness_terms(creature, config, 0.005, horizon, tally)["distance"])
+    term = float(fitness_terms(creature, config, 0.005, horizon, stats)["distance"])
     assert term == pytest.approx(lengths * (1 + 2 * BEYOND), rel=1e-5)
-    metres = experiment.simulator.task.outcome(tally)["forward"]
+    metres = experiment.simulator.task.outcome(stats)["forward"]
     assert float(metres) == pytest.approx(3 * lengths * creature.frame.body_length, rel=1e-4)
 
 
@@ -359,13 +359,13 @@ def test_a_fall_scores_below_everybody_who_stays_up(experiment: Experiment, stoo
     steps, judge = experiment.simulator.steps, experiment.simulator.task
 
     def fitness(config: Config, forward: float, reason: Reason, after: int) -> float:
-        tally = dataclasses.replace(
+        stats = dataclasses.replace(
             judge.init(),
             steps=jnp.int32(after),
             reason=jnp.int32(reason),
             forward=jnp.float32(forward),
         )
-        named = fitness_terms(stool, config.fitness, 0.005, steps, tally)
+        named = fitness_terms(stool, config.fitness, 0.005, steps, stats)
         terms = in_order(named, terms_under(config.fitness.weights))
         return float(score(terms[None], weight_vector(config.fitness, jnp.int32(0)), 0.0))
 

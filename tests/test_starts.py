@@ -143,7 +143,7 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(weighed: Experiment):
 @pytest.mark.thorough("test_evolve_body.py has a body per lane in episodes")
 def test_where_the_masses_count_everybody_moves_otherwise(weighed: Experiment):
     """Nothing else tells the starts apart."""
-    forward = jax.jit(weighed.simulate)(weighed.init().genomes).tally.forward
+    forward = jax.jit(weighed.simulate)(weighed.init().genomes).stats.forward
     assert np.abs(np.diff(forward, axis=1)).max() > 1e-5
 
 

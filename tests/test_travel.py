@@ -74,18 +74,18 @@ def test_the_goal_of_other_tasks_stays(stool: Creature):
 
 def test_what_counts_is_the_way_and_what_is_told_are_the_goals(stool: Creature):
     travel, goal = task(stool), aim(0.5, 0.5)
-    tally, standards = travel.init(), travel.standards(TravelConfig())
-    assert float(travel.outcome(tally)["way"]) == 0
+    stats, standards = travel.init(), travel.standards(TravelConfig())
+    assert float(travel.outcome(stats)["way"]) == 0
     for forward in (0.0, 0.3, 0.49, 0.8, 1.01, 1.1):
         sensed = moment(stool, forward)
-        tally = travel.update(tally, sensed, jnp.zeros(4), standards, goal)
+        stats = travel.update(stats, sensed, jnp.zeros(4), standards, goal)
         goal = travel.onward(goal, sensed)
-    told = travel.outcome(tally)
+    told = travel.outcome(stats)
     assert (float(told["goals"]), float(told["way"])) == (2.0, pytest.approx(1.1, abs=1e-6))
-    terms = travel.judge(tally, TravelConfig())
+    terms = travel.judge(stats, TravelConfig())
     assert set(terms) == set(travel.terms)
     assert float(terms["distance"]) == pytest.approx(1 - 1.1 / NOMINAL_GOAL, abs=1e-6)
-    far = dataclasses.replace(tally, goal=jnp.float32(9.0), left=jnp.float32(0.3))
+    far = dataclasses.replace(stats, goal=jnp.float32(9.0), left=jnp.float32(0.3))
     assert float(travel.judge(far, TravelConfig())["distance"]) < -6
 
 
@@ -104,14 +104,14 @@ def test_a_controller_is_told_the_same_moving_goals(
     }
     experiment = build_experiment(stool, build_config(table, "test"))
     state = experiment.init()
-    tally = jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
-    best = int(tally.reached.sum(1).argmax())
-    assert tally.reached[best].max() >= 1
+    stats = jax.device_get(jax.jit(experiment.simulate)(state.genomes).stats)
+    best = int(stats.reached.sum(1).argmax())
+    assert stats.reached[best].max() >= 1
     starts = nominal_starts(stool, 3)
     starts.goal[:] = experiment.starts.goal
     champion = experiment.champion(state, {}, best)
     path = simulate(stool, champion, starts, 0.4).path[:, -2]
-    np.testing.assert_allclose((tally.goal - tally.left)[best], path, atol=1e-4)
+    np.testing.assert_allclose((stats.goal - stats.left)[best], path, atol=1e-4)
 
 
 # The examiner

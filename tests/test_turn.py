@@ -14,7 +14,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.reference.measure import Recording
 from mjxgait.tasks.turn.criteria import AWAY, RATE, TurnCriteria
-from mjxgait.tasks.turn.task import Turn, TurnSettings, TurnTally
+from mjxgait.tasks.turn.task import Turn, TurnSettings, TurnStats
 
 STEP, STEPS = 0.1, 20
 TORQUE = jnp.array([2.0, -2.0, 0.0, 0.0])
@@ -23,7 +23,7 @@ TORQUE = jnp.array([2.0, -2.0, 0.0, 0.0])
 def episode(stool: Creature, steps: int = STEPS, turn: float = 0.5, drift: float = 0.0) -> tuple:
     """Statistics and terms after turning by so many rad/s and drifting by so many m/s."""
     task = Turn(stool, STEP, STEPS, Termination())
-    tally: TurnTally = task.init()
+    stats: TurnStats = task.init()
     for step in range(steps):
         moment = seen(
             stool,
@@ -31,8 +31,8 @@ def episode(stool: Creature, steps: int = STEPS, turn: float = 0.5, drift: float
             trunk_angvel=np.array([0.0, 0.0, turn]),
             joint_vel=np.ones(4),
         )
-        tally = task.update(tally, moment, TORQUE, TurnSettings(), ())
-    return task, tally, task.judge(tally, TurnSettings(rate=90.0))
+        stats = task.update(stats, moment, TORQUE, TurnSettings(), ())
+    return task, stats, task.judge(stats, TurnSettings(rate=90.0))
 
 
 def test_a_turn_to_the_left_counts_up_to_the_wanted_rate(stool: Creature):

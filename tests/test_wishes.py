@@ -35,7 +35,7 @@ from mjxgait.tasks.walk.gaits import (
     placed,
     stations_of,
 )
-from mjxgait.tasks.walk.stats import Footfalls, Tally, gait_missed, no_footfalls, stepped
+from mjxgait.tasks.walk.stats import EpisodeStats, Footfalls, gait_missed, no_footfalls, stepped
 from mjxgait.tasks.walk.targets import (
     Wishes,
     configured,
@@ -82,17 +82,17 @@ def config_of(weights: dict | None = None, **wish) -> WalkConfig:
 
 @pytest.fixture(scope="module")
 def fitness_of(body: Creature):
-    """Fitness of one episode by its tally, whatever the settings; compiled once."""
+    """Fitness of one episode by its statistics, whatever the settings; compiled once."""
     task = asked(config_of(WHIP, gait="trot", height=0.9, bounce=0.02, sway=6.0), body)
 
     @jax.jit
-    def judged(tally, config: WalkConfig) -> jax.Array:
-        terms = in_order(task.judge(tally, config), task.terms)
+    def judged(stats, config: WalkConfig) -> jax.Array:
+        terms = in_order(task.judge(stats, config), task.terms)
         weights = in_order(task.weights(config, jnp.int32(0)), task.terms)
         return score(terms[None], weights, 0.5)
 
-    def fitness(tally: dict, config: WalkConfig) -> float:
-        arrays = {name: jnp.asarray(value, jnp.float32) for name, value in tally.items()}
+    def fitness(stats: dict, config: WalkConfig) -> float:
+        arrays = {name: jnp.asarray(value, jnp.float32) for name, value in stats.items()}
         filled = dataclasses.replace(task.init(), **arrays)
         return float(judged(filled, config))
 
@@ -188,7 +188,7 @@ def test_without_a_wish_nothing_is_looked_at(body: Creature):
     task = Walk.told(body, STEP, HORIZON, body.settings.termination, free)
     assert type(task) is Walk
     assert task.terms == terms_under(free.weights)
-    assert type(task.init()) is Tally
+    assert type(task.init()) is EpisodeStats
     asks = traced_fitness(config_of()).wish
     assert len(jax.tree.leaves(asks)) == len(jax.tree.leaves(traced_fitness(free).wish)) + 1
 
@@ -209,10 +209,10 @@ def footfalls_of(phases: list[float], duty: float, period: int = 160) -> Footfal
     return jax.lax.scan(step, first, swinging)[0][0]
 
 
-BLANK = Tally(
+BLANK = EpisodeStats(
     **{
         field.name: jnp.zeros((), jnp.int32 if field.name == "steps" else None)
-        for field in dataclasses.fields(Tally)
+        for field in dataclasses.fields(EpisodeStats)
     }
 )
 PLACES = {

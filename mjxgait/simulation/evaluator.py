@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from mjxgait.config.schema import Config
 from mjxgait.simulation.rollout import Episodes, Simulator
-from mjxgait.tasks.base import FINISHED, NONFINITE, Tally, in_order
+from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, in_order
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Asked, Judged
 
@@ -40,33 +40,33 @@ class Local:
         """See `Evaluator`. Outside the simulations, each row reads only its own data."""
         wanted = None if asked is None else jnp.asarray(asked.wanted)
         episodes = self.simulator.simulate(genomes, trials, settings, wanted)
-        lived = jnp.sum(episodes.tally.steps, axis=(1, 2))
+        lived = jnp.sum(episodes.stats.steps, axis=(1, 2))
         # Idle lanes belong to no row: each row is charged in proportion to its own steps.
         share = lived / jnp.maximum(jnp.sum(lived), 1)
         computed = jnp.round(episodes.computed_steps * share).astype(jnp.int32)
 
-        def of_row(row: tuple[Config, Tally, jax.Array]) -> Judged:
-            settings, tally, computed = row
-            return self.verdict(settings, Episodes(tally, computed))
+        def of_row(row: tuple[Config, EpisodeStats, jax.Array]) -> Judged:
+            settings, stats, computed = row
+            return self.verdict(settings, Episodes(stats, computed))
 
-        judged = jax.lax.map(of_row, (settings, episodes.tally, computed))
+        judged = jax.lax.map(of_row, (settings, episodes.stats, computed))
         return judged if asked is None else completed(judged, asked)
 
     def verdict(self, settings: Config, episodes: Episodes) -> Judged:
         """Return the results of one row's episodes, statistics with leaves [N, R, ...]."""
-        task, tally = self.simulator.task, episodes.tally
+        task, stats = self.simulator.task, episodes.stats
 
         def each(
-            function: Callable[[Tally], Mapping[str, jax.Array]], names: tuple[str, ...]
+            function: Callable[[EpisodeStats], Mapping[str, jax.Array]], names: tuple[str, ...]
         ) -> jax.Array:
-            return jax.vmap(jax.vmap(lambda one: in_order(function(one), names)))(tally)
+            return jax.vmap(jax.vmap(lambda one: in_order(function(one), names)))(stats)
 
         terms = each(partial(task.judge, settings=settings.fitness), task.terms)
         return Judged(
-            terms=jnp.where((tally.reason == NONFINITE)[..., None], jnp.nan, terms),
+            terms=jnp.where((stats.reason == NONFINITE)[..., None], jnp.nan, terms),
             outcome=each(task.outcome, task.outcomes),
-            failed=tally.reason != FINISHED,
-            sim_steps=jnp.sum(tally.steps),
+            failed=stats.reason != FINISHED,
+            sim_steps=jnp.sum(stats.steps),
             computed_steps=episodes.computed_steps,
         )
 

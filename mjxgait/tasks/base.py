@@ -23,7 +23,7 @@ FINISHED, NONFINITE = 0, -1
 
 
 @pytree
-class Tally:
+class EpisodeStats:
     """Episode statistics common to all tasks; a task's own class adds fields.
 
     steps: [] until the end of the episode.
@@ -39,7 +39,7 @@ class Tally:
 Settings_contra = TypeVar("Settings_contra", contravariant=True)
 Aim = TypeVar("Aim")
 Standards = TypeVar("Standards")
-Stats = TypeVar("Stats", bound=Tally)
+Stats = TypeVar("Stats", bound=EpisodeStats)
 
 
 class Task(Protocol[Settings_contra, Aim, Standards, Stats]):
@@ -109,16 +109,16 @@ class Task(Protocol[Settings_contra, Aim, Standards, Stats]):
         ...
 
     def update(
-        self, tally: Stats, sensed: Sensed, torque: jax.Array, standards: Standards, aim: Aim
+        self, stats: Stats, sensed: Sensed, torque: jax.Array, standards: Standards, aim: Aim
     ) -> Stats:
         """Return the statistics after one more step under this torque [J] in N·m."""
         ...
 
-    def judge(self, tally: Stats, settings: Settings_contra) -> Mapping[str, jax.Array]:
+    def judge(self, stats: Stats, settings: Settings_contra) -> Mapping[str, jax.Array]:
         """Fitness terms [] of an episode by name, each without unit and before its weight."""
         ...
 
-    def outcome(self, tally: Stats) -> Mapping[str, jax.Array]:
+    def outcome(self, stats: Stats) -> Mapping[str, jax.Array]:
         """Metrics by name, in m, s or counts; never a score converted back."""
         ...
 

@@ -13,7 +13,7 @@ from mjxgait.config.tables import NoSettings
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.tasks.base import Tally, why_fallen
+from mjxgait.tasks.base import EpisodeStats, why_fallen
 from mjxgait.tasks.starts import Starts, draw_starts
 from mjxgait.types import Sensed
 
@@ -22,7 +22,7 @@ class PlainTask(abc.ABC):
     """Base class for user-defined tasks (docs/guide/your-own-task.md).
 
     A subclass needs `counts`, the weight of each fitness term by name, and `judge`. Its own
-    statistics of an episode go into a `Tally` of its own. `Settings` is a frozen dataclass of
+    statistics of an episode go into a `EpisodeStats` of its own. `Settings` is a frozen dataclass of
     numbers that become keys of `[fitness]`. step: s. horizon: T, steps of a full episode. ends:
     definition of a fall.
     """
@@ -77,23 +77,23 @@ class PlainTask(abc.ABC):
         """See `Task`: the same."""
         return aim
 
-    def init(self) -> Tally:
+    def init(self) -> EpisodeStats:
         """See `Task`."""
         none = jnp.zeros((), jnp.int32)
-        return Tally(steps=none, reason=none, overlap=jnp.zeros(()))
+        return EpisodeStats(steps=none, reason=none, overlap=jnp.zeros(()))
 
     def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
         """See `Task`: a fall ends the episode."""
         return why_fallen(self.creature, self.ends, sensed)
 
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Any:
         """See `Task`: one more step."""
-        return dataclasses.replace(tally, steps=tally.steps + 1)
+        return dataclasses.replace(stats, steps=stats.steps + 1)
 
     @abc.abstractmethod
-    def judge(self, tally: Any, settings: Any) -> Mapping[str, jax.Array]:
+    def judge(self, stats: Any, settings: Any) -> Mapping[str, jax.Array]:
         """See `Task`."""
 
     @classmethod
@@ -104,9 +104,9 @@ class PlainTask(abc.ABC):
         """
         return ()
 
-    def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
+    def outcome(self, stats: Any) -> Mapping[str, jax.Array]:
         """See `Task`: s until the end."""
-        return {"seconds": tally.steps * self.step}
+        return {"seconds": stats.steps * self.step}
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
         """See `Task`."""

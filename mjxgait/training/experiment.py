@@ -124,7 +124,7 @@ class Experiment:
         """
         rows = _lone((genomes, starts or self.starts, self.row.settings))
         episodes = self.simulator.simulate(*rows)
-        return Episodes(_only(episodes.tally), episodes.computed_steps)
+        return Episodes(_only(episodes.stats), episodes.computed_steps)
 
     def compile(self, evaluator: Evaluator | None = None) -> Step:
         """Compile a generation; `evaluator` evaluates it elsewhere."""

@@ -51,8 +51,8 @@ def experiment() -> Experiment:
 def first(experiment: Experiment) -> EvolutionState:
     """The first population, judged without a generation around it; the best come first."""
     state, task = experiment.init(), experiment.simulator.task
-    tally = jax.jit(experiment.simulate)(state.genomes).tally
-    told = jax.vmap(jax.vmap(task.outcome))(tally)
+    stats = jax.jit(experiment.simulate)(state.genomes).stats
+    told = jax.vmap(jax.vmap(task.outcome))(stats)
     outcome = np.stack([np.asarray(told[name]) for name in task.outcomes], axis=-1)
     order = np.argsort(-outcome[:, :, 0].mean(1))
     return dataclasses.replace(
@@ -129,7 +129,7 @@ def test_who_has_a_light_of_its_own_is_simulated_for_itself(experiment: Experime
 
 
 def nearer(body: Creature, outcome: Outcome) -> float:
-    """m to what was ahead, from 0.1 s on; the tally has seen what was before the last step."""
+    """m to what was ahead, from 0.1 s on; the statistics include what was before the last step."""
     film = outcome.trajectory
     middle = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).middle[[10, -1], :2]
     apart = np.linalg.norm(middle - [LIGHT, 0.0], axis=1)
@@ -161,7 +161,7 @@ def judged(
 ) -> dict[str, float]:
     """Of one that goes on at 1 m/s. tilt: deg at a moment in between; before: before it counts."""
     settings = RoamConfig(settle=0.5)
-    tally, standards = task.init(), task.standards(settings)
+    stats, standards = task.init(), task.standards(settings)
     for k in range(task.horizon):
         angle = np.radians({10: before, 100: tilt}.get(k, 0.0))
         turned = jnp.array(
@@ -173,8 +173,8 @@ def judged(
             trunk_rot=turned,
             sunk=jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
         )
-        tally = task.update(tally, sensed, jnp.zeros(3), standards, ())
-    return {name: float(value) for name, value in task.judge(tally, settings).items()}
+        stats = task.update(stats, sensed, jnp.zeros(3), standards, ())
+    return {name: float(value) for name, value in task.judge(stats, settings).items()}
 
 
 @pytest.fixture(scope="module")
@@ -204,14 +204,14 @@ def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
 
     def jumped(sunk: float = 0.0, again: float = 0.0) -> dict[str, float]:
         """To 0.3 m in the first half of what counts, and to another height in the second."""
-        tally, standards = jumping.init(), jumping.standards(settings)
+        stats, standards = jumping.init(), jumping.standards(settings)
         heights = {10: 0.7, 60: 0.2, 80: 0.3, 120: again, 140: again / 2}
         for k in range(task.horizon):
             low = CALM.geom_low.at[:].set(1.0).at[1].set(heights.get(k, 0.0))
             deep = jnp.float32(sunk if k == 100 else -1.0)
             sensed = dataclasses.replace(CALM, geom_low=low, sunk=deep)
-            tally = jumping.update(tally, sensed, jnp.zeros(3), standards, ())
-        return {name: float(value) for name, value in jumping.judge(tally, settings).items()}
+            stats = jumping.update(stats, sensed, jnp.zeros(3), standards, ())
+        return {name: float(value) for name, value in jumping.judge(stats, settings).items()}
 
     assert jumped(again=0.3) == pytest.approx({"height": 0.3, "overlap": 0, "wild": 0})
     assert jumped() == pytest.approx({"height": 0.15, "overlap": 0, "wild": 0})
@@ -239,12 +239,12 @@ def test_to_follow_is_to_get_nearer_to_the_light(task: Roam, follower: type):
     following = follower(task.creature, task.step, task.horizon, task.ends)
     settings = following.Settings(settle=0.0)
     for light, way in (([10.0, 0, 0], 2.0), ([-10.0, 0, 0], -2.0), ([0, 10.0, 0], -0.198)):
-        tally, standards = following.init(), following.standards(settings)
+        stats, standards = following.init(), following.standards(settings)
         for k in (0, 1):
             sensed = dataclasses.replace(CALM, middle=jnp.array([2.0 * k, 0.0, 0.0]))
-            tally = following.update(tally, sensed, jnp.zeros(3), standards, jnp.array(light))
-        assert float(following.way(tally)) == pytest.approx(way, abs=1e-3)
-        judged = following.judge(dataclasses.replace(tally, overlap=jnp.float32(1.0)), settings)
+            stats = following.update(stats, sensed, jnp.zeros(3), standards, jnp.array(light))
+        assert float(following.way(stats)) == pytest.approx(way, abs=1e-3)
+        judged = following.judge(dataclasses.replace(stats, overlap=jnp.float32(1.0)), settings)
         assert (judged["overlap"] > 0) == (way > 0), "nothing is gained by blocks in each other"
 
 
@@ -303,8 +303,8 @@ def test_what_a_follower_promised_counts_from_when_evolution_counted(task: Roam)
     following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
     settings, still = following.Settings(settle=0.5), jnp.zeros(3)
     standards = following.standards(settings)
-    tally = following.update(following.init(), CALM, still, standards, jnp.ones(3))
-    assert float(following.outcome(tally)["since"]) == pytest.approx(0.5, abs=task.step)
+    stats = following.update(following.init(), CALM, still, standards, jnp.ones(3))
+    assert float(following.outcome(stats)["since"]) == pytest.approx(0.5, abs=task.step)
     acceptance, config = acceptance_of("follow-on-land"), CertificateConfig()
     for told, since in (({"since": 4.0}, 4.0), ({}, config.warmup)):
         nominal = {"way": 1.2, "seconds": 10.0, **told}

@@ -106,7 +106,7 @@ def judged(task: Swim, given: float, overlap: float = 0.0) -> dict[str, float]:
     """Of one of 2 kg that the water pushes with 3 N along x: `given` is the share of its momentum
     that is the water's. Counting begins in motion."""
     settings, step = SwimConfig(settle=0.1), task.step
-    tally, standards = task.init(), task.standards(settings)
+    stats, standards = task.init(), task.standards(settings)
     push, place = 3.0, 0.0
     for k in range(task.horizon):
         momentum = 1.0 + push / given * step * k
@@ -114,10 +114,10 @@ def judged(task: Swim, given: float, overlap: float = 0.0) -> dict[str, float]:
         sensed = dataclasses.replace(
             CALM, middle=place * along, momentum=momentum * along, washed=push * along
         )
-        tally = task.update(tally, sensed, jnp.zeros(3), standards, ())
+        stats = task.update(stats, sensed, jnp.zeros(3), standards, ())
         place += momentum / 2 * step
-    tally = dataclasses.replace(tally, overlap=jnp.float32(overlap))
-    return {name: float(value) for name, value in task.judge(tally, settings).items()}
+    stats = dataclasses.replace(stats, overlap=jnp.float32(overlap))
+    return {name: float(value) for name, value in task.judge(stats, settings).items()}
 
 
 def test_momentum_that_the_water_did_not_give_costs_speed(experiment: Experiment):
@@ -149,7 +149,7 @@ def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved):
         body = champion.embodied(experiment.creature)
         film = simulate(body, champion, nominal_starts(body, 1), 1.6, record=1).trajectory
         middle = seen_grown(body, film.qpos[0], film.qvel[0], DRAG).middle
-        # It counts from 0.1 s on; the tally has seen what was before the last step.
+        # It counts from 0.1 s on; the statistics include what was before the last step.
         ways.append(np.linalg.norm(middle[-1] - middle[10]))
     lengths = np.array(ways)
     assert lengths.max() > 0.02

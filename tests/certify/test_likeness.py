@@ -113,7 +113,7 @@ def natural(tiny: Creature) -> Walk:
     return Walk.told(tiny, STEP, HORIZON, tiny.settings.termination, config)
 
 
-def tally_of(task: Walk, speed: float, stride: float = 1.0, duty: float = 1.0, **more):
+def stats_of(task: Walk, speed: float, stride: float = 1.0, duty: float = 1.0, **more):
     """What such a walk leaves behind in evolution, after 5 s."""
     hip = task.creature.frame.hip_height
     swings = HORIZON * STEP * speed / (stride * animal_stride(speed, hip))
@@ -131,18 +131,18 @@ def tally_of(task: Walk, speed: float, stride: float = 1.0, duty: float = 1.0, *
 
 @pytest.mark.parametrize("speed", [0.2, 0.5, 1.0])
 def test_evolution_knows_an_animal_at_any_speed(natural: Walk, speed: float):
-    found = evolution.likeness(natural.creature, STEP, HORIZON, tally_of(natural, speed))
+    found = evolution.likeness(natural.creature, STEP, HORIZON, stats_of(natural, speed))
     np.testing.assert_allclose([found[name] for name in LIKENESS], [1, 1, 0, 0], atol=1e-5)
 
 
 def test_evolution_misses_what_the_examiner_does(natural: Walk):
     """By the same figures: strides, duty factor, where feet stand, and the nose."""
     hip = natural.creature.frame.hip_height
-    tally = tally_of(natural, 0.5, stride=0.7, duty=0.8)
-    stood = 0.1 * hip * tally.contact * jnp.array([1, 1, -1, -1])
+    stats = stats_of(natural, 0.5, stride=0.7, duty=0.8)
+    stood = 0.1 * hip * stats.contact * jnp.array([1, 1, -1, -1])
     nose_down = HORIZON * np.radians(6.0)
-    tally = dataclasses.replace(tally, reach=stood, pitch=jnp.float32(nose_down))
-    found = evolution.likeness(natural.creature, STEP, HORIZON, tally)
+    stats = dataclasses.replace(stats, reach=stood, pitch=jnp.float32(nose_down))
+    found = evolution.likeness(natural.creature, STEP, HORIZON, stats)
     np.testing.assert_allclose([found[n] for n in LIKENESS], [0.7, 0.8, 0.1, -6.0], rtol=1e-4)
     made = like_an_animal(stride=0.7, duty=0.8)
     made = dataclasses.replace(
@@ -161,16 +161,16 @@ def test_evolution_misses_what_the_examiner_does(natural: Walk):
 )
 def test_what_is_unlike_an_animal_costs(natural: Walk, less: dict):
     config = small_config(fitness={"wish": ANIMAL}).fitness
-    like, unlike = (natural.judge(tally_of(natural, 0.5, **how), config) for how in ({}, less))
+    like, unlike = (natural.judge(stats_of(natural, 0.5, **how), config) for how in ({}, less))
     worse = [n for n in LIKENESS if float(unlike[n]) > float(like[n]) + 0.05]
     assert worse == ["duty_factor" if "duty" in less else next(iter(less))]
 
 
 def test_who_never_lifts_a_foot_is_compared_all_the_same(natural: Walk):
     config = small_config(fitness={"wish": ANIMAL}).fitness
-    drags = tally_of(natural, 0.5, swings=np.zeros(4))
-    for tally in (drags, dataclasses.replace(drags, steps=jnp.int32(1)), natural.init()):
-        terms = natural.judge(tally, config)
+    drags = stats_of(natural, 0.5, swings=np.zeros(4))
+    for stats in (drags, dataclasses.replace(drags, steps=jnp.int32(1)), natural.init()):
+        terms = natural.judge(stats, config)
         assert all(np.isfinite(float(value)) for value in terms.values())
 
 

@@ -18,8 +18,8 @@ from mjxgait.tasks.plain import PlainTask
 class Idle(PlainTask):
     terms = ("nothing",)
 
-    def judge(self, tally, settings):
-        return {"nothing": 0.0 * tally.steps}
+    def judge(self, stats, settings):
+        return {"nothing": 0.0 * stats.steps}
 """
 
 

@@ -1,7 +1,7 @@
 """The same episodes through the fast step, plain MJX and the examiner: every figure must agree.
 
 The examiner is C MuJoCo in float64 under a controller of its own; what its recording means for the
-tally is worked out once more, in plain NumPy (`recorded_tally`). Nothing that changes the motion,
+statistics are worked out once more, in plain NumPy (`recorded_stats`). Nothing that changes the motion,
 or what is counted of it, on one of the three ways can stay unseen.
 """
 
@@ -29,7 +29,7 @@ from disturbed_walks import (
     watched,
 )
 from helpers import STILL, small_config
-from recorded_tally import Frames, end, tally_of
+from recorded_stats import Frames, end, stats_of
 
 from mjxgait.config.traced import traced
 from mjxgait.controllers.key_poses.controller import TUNING as GENES
@@ -38,7 +38,7 @@ from mjxgait.creature import Creature
 from mjxgait.reference.outcome import Outcome
 from mjxgait.tasks.base import Reason
 from mjxgait.tasks.starts import NEVER, Starts
-from mjxgait.tasks.walk.stats import Tally
+from mjxgait.tasks.walk.stats import EpisodeStats
 from mjxgait.training.experiment import build_experiment
 
 SLIM = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": True}
@@ -85,7 +85,9 @@ MJX = pytest.mark.thorough("test_ground_parity.py compares the fast step with MJ
     params=["auto", pytest.param("mjx", marks=MJX)],
     ids=["the fast step", "plain MJX"],
 )
-def tallies(request: pytest.FixtureRequest, body: Creature, outcomes: list[Outcome]) -> Tally:
+def statistics(
+    request: pytest.FixtureRequest, body: Creature, outcomes: list[Outcome]
+) -> EpisodeStats:
     """Evolution's, leaves [B, 1, R, ...]."""
     rollout = {"seconds": SECONDS, "lanes": 3, "physics": request.param, **LENIENT}
     simulator = build_experiment(body, small_config(rollout=rollout)).simulator
@@ -95,14 +97,14 @@ def tallies(request: pytest.FixtureRequest, body: Creature, outcomes: list[Outco
     settings = jax.tree.map(lambda *leaves: jnp.stack(leaves), *map(traced, CONFIGS))
     arguments = (genomes, starts_of(body, outcomes), settings)
     program = jax.jit(simulator.simulate).lower(*arguments).compile(compiler_options=SLIM)
-    return jax.device_get(program(*arguments)).tally
+    return jax.device_get(program(*arguments)).stats
 
 
 @pytest.fixture(scope="module")
 def expected(
     body: Creature, outcomes: list[Outcome]
 ) -> dict[tuple[str, str], dict[str, np.ndarray]]:
-    """What the examiner's recordings mean for the tally, by settings and disturbance."""
+    """What the examiner's recordings mean for the statistics, by settings and disturbance."""
     found = {}
     for name, config, outcome in zip(SETTINGS, CONFIGS, outcomes, strict=True):
         clearance = config.fitness.clearance * body.frame.hip_height
@@ -111,22 +113,26 @@ def expected(
             steps, reason = end(frames, FALL)
             if steps > STEPS:
                 steps, reason = STEPS, Reason.FINISHED
-            tally = tally_of(frames, steps, STEPS // 2, clearance)
-            found[name, disturbance] = {**tally, "reason": reason}
+            stats = stats_of(frames, steps, STEPS // 2, clearance)
+            found[name, disturbance] = {**stats, "reason": reason}
     return found
 
 
-def test_every_field_of_the_tally_is_compared(expected: dict):
+def test_every_field_of_the_statistics_is_compared(expected: dict):
     for name in FIELDS:
-        assert all(name in tally for tally in expected.values()), (
-            f"Tally.{name} is compared with nothing: work it out in recorded_tally.py, or say in "
+        assert all(name in stats for stats in expected.values()), (
+            f"EpisodeStats.{name} is compared with nothing: work it out in recorded_stats.py, or say in "
             f"UNCOMPARED why not"
         )
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_the_tally_is_what_the_examiner_saw(tallies: Tally, expected: dict, name: str):
-    rows = dict(zip(EPISODES, np.reshape(getattr(tallies, name), (len(EPISODES), -1)), strict=True))
+def test_the_statistics_is_what_the_examiner_saw(
+    statistics: EpisodeStats, expected: dict, name: str
+):
+    rows = dict(
+        zip(EPISODES, np.reshape(getattr(statistics, name), (len(EPISODES), -1)), strict=True)
+    )
     for episode, ours in rows.items():
         theirs = np.ravel(np.asarray(expected[episode][name], float))
         most = tolerance(name, theirs)
@@ -136,7 +142,7 @@ def test_the_tally_is_what_the_examiner_saw(tallies: Tally, expected: dict, name
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "reason"])
 def test_every_field_has_something_to_show(expected: dict, name: str):
     """A figure that is next to zero in all episodes would agree with anything."""
-    values = [np.asarray(tally[name], float) for tally in expected.values()]
+    values = [np.asarray(stats[name], float) for stats in expected.values()]
     assert any(np.abs(value).max() > 3 * tolerance(name, value) for value in values)
 
 
@@ -159,12 +165,12 @@ def test_all_settings_show(expected: dict, settings: str):
 
 
 def test_a_fall_ends_the_episode_where_the_examiner_sees_it(
-    outcomes: list[Outcome], tallies: Tally
+    outcomes: list[Outcome], statistics: EpisodeStats
 ):
     """Why it ended has been compared above; the examiner dates a fall by the end of its step."""
     knocked = list(DISTURBANCES).index("knocked over")
     for row, name in enumerate(SETTINGS):
         fell = round(outcomes[row].fell[knocked] / STEP)
         assert PUSH_AT < fell < STEPS, name
-        assert tallies.steps[row, 0, knocked] == fell, name
-        assert tallies.reason[row, 0, knocked] != Reason.FINISHED
+        assert statistics.steps[row, 0, knocked] == fell, name
+        assert statistics.reason[row, 0, knocked] != Reason.FINISHED

@@ -30,7 +30,7 @@ from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
 from mjxgait.tasks.base import DEEP, TOUCHING, Reason
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import fitness_terms
-from mjxgait.tasks.walk.stats import Judge, Tally
+from mjxgait.tasks.walk.stats import EpisodeStats, Judge
 from mjxgait.types import BodyState
 
 LANES = 6
@@ -269,14 +269,14 @@ def test_the_long_edges_of_a_box_are_hardly_bare(size: str):
         assert -1e-9 < min(bare) < 0.12 * half.min()
 
 
-def test_the_tally_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
+def test_the_statistics_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
     """Not of a lane whose episode has ended, nor of one whose state is not a number."""
     judge = Judge(stool, 0.005, 8)
     steps = jnp.array([CHECK_EVERY, CHECK_EVERY, 100, CHECK_EVERY, CHECK_EVERY])
     reasons = [Reason.FINISHED, Reason.FINISHED, Reason.FINISHED, Reason.TIPPED, Reason.FINISHED]
-    tally = jax.tree.map(lambda leaf: jnp.stack([leaf] * 5), judge.init())
-    tally = dataclasses.replace(
-        tally,
+    stats = jax.tree.map(lambda leaf: jnp.stack([leaf] * 5), judge.init())
+    stats = dataclasses.replace(
+        stats,
         steps=steps,
         reason=jnp.array(reasons),
         overlap=jnp.array([0.0, 0.04, 0.0, 0.0, 0.01]),
@@ -286,17 +286,17 @@ def test_the_tally_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
         Any, SimpleNamespace(plant=SimpleNamespace(overlap=lambda _: depth), steps=100)
     )
     fields = dict.fromkeys(field.name for field in dataclasses.fields(Lane))
-    lane = cast(Any, Lane)(**(fields | {"tally": tally}))
-    found = Simulator._look_for_overlap(simulator, lane).tally
+    lane = cast(Any, Lane)(**(fields | {"stats": stats}))
+    found = Simulator._look_for_overlap(simulator, lane).stats
     np.testing.assert_allclose(found.overlap, [0.03, 0.04, 0.0, 0.0, 0.01])
 
 
-def term(creature: Creature, tally: Tally, forward: float) -> float:
+def term(creature: Creature, stats: EpisodeStats, forward: float) -> float:
     config = WalkConfig(speed=1.0)
-    tally = dataclasses.replace(
-        tally, forward=jnp.float32(forward * creature.frame.body_length), steps=jnp.int32(200)
+    stats = dataclasses.replace(
+        stats, forward=jnp.float32(forward * creature.frame.body_length), steps=jnp.int32(200)
     )
-    return float(fitness_terms(creature, config, 0.005, 200, tally)["overlap"])
+    return float(fitness_terms(creature, config, 0.005, 200, stats)["overlap"])
 
 
 def test_the_term_grows_with_depth_and_counts_as_far_as_there_is_a_walk(stool: Creature):
@@ -332,6 +332,6 @@ def test_a_walker_whose_legs_cross_is_seen_and_nobody_else(stool: Creature):
     )
     genomes = dataclasses.replace(genomes, key_poses=jnp.asarray(poses, jnp.float32))
     # The same program as that of test_rollout.py.
-    depth = jax.jit(experiment.simulate)(genomes, experiment.starts).tally.overlap
+    depth = jax.jit(experiment.simulate)(genomes, experiment.starts).stats.overlap
     assert (depth[2] > 0.001).all()
     assert (np.delete(np.asarray(depth), 2, axis=0) == 0).all()

@@ -63,7 +63,7 @@ def test_evolution_and_examiner_move_everybody_alike(run: mjxgait.Run):
     told = snapshot.arrays["outcome"][:, 0, 0]
     everybody = [snapshot.champion(rank + 1) for rank in range(len(told))]
     starts, step = nominal_starts(run.creature, 1), run.creature.model.opt.timestep
-    # The tally has seen the state before the last step.
+    # The statistics include the state before the last step.
     seen = [simulate(run.creature, one, starts, 0.2 - step).travel[0, 0] for one in everybody]
     # A last bit may turn an `ifltz` the other way, so not all are alike in the end.
     alike = abs(np.array(seen) - told) < 1e-5

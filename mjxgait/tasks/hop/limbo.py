@@ -75,8 +75,8 @@ class Aim:
 
 
 @pytree
-class Tally(hop.Tally):
-    """See `hop.Tally`.
+class EpisodeStats(hop.EpisodeStats):
+    """See `hop.EpisodeStats`.
 
     bar: [] m, greatest depth in the bar at its final height.
     raised: [] m of it that cost nothing yet.
@@ -146,27 +146,27 @@ class Limbo(Hop):
         }
 
     @override
-    def init(self) -> Tally:
+    def init(self) -> EpisodeStats:
         none = jnp.zeros(())
-        return Tally(**vars(super().init()), bar=none, raised=none, height=none)
+        return EpisodeStats(**vars(super().init()), bar=none, raised=none, height=none)
 
     @override
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Any:
-        after: Any = super().update(tally, sensed, torque, standards, aim.goal)
-        deepest = jnp.maximum(tally.bar, intrusion(self.creature, sensed, standards.height))
+        after: Any = super().update(stats, sensed, torque, standards, aim.goal)
+        deepest = jnp.maximum(stats.bar, intrusion(self.creature, sensed, standards.height))
         return dataclasses.replace(after, bar=deepest, raised=aim.raised, height=standards.height)
 
     @override
-    def judge(self, tally: Any, settings: object) -> dict[str, jax.Array]:
-        deep = jnp.maximum(tally.bar - tally.raised, 0.0)
+    def judge(self, stats: Any, settings: object) -> dict[str, jax.Array]:
+        deep = jnp.maximum(stats.bar - stats.raised, 0.0)
         bar = jnp.minimum(deep / (DEEP * self.creature.frame.hip_height), 1.0)
-        return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})
+        return fitness_terms(self.creature, self.horizon, stats, {"bar": bar})
 
-    def outcome(self, tally: Any) -> dict[str, jax.Array]:
+    def outcome(self, stats: Any) -> dict[str, jax.Array]:
         """See `Task`: as for hopping, and the height in m of a bar that would just be cleared.
 
         It is at least the height of the bar itself.
         """
-        return super().outcome(tally) | {"bar": tally.height + tally.bar}
+        return super().outcome(stats) | {"bar": stats.height + stats.bar}

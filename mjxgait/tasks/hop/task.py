@@ -16,8 +16,8 @@ from mjxgait.tasks.hop import stats as hop
 from mjxgait.tasks.hop.config import GOALS, NEAR, NOMINAL_GOAL, GoalConfig, HopConfig, TravelConfig
 from mjxgait.tasks.hop.stats import (
     GOAL,
+    EpisodeStats,
     Standards,
-    Tally,
     away,
     empty,
     fitness_terms,
@@ -93,30 +93,35 @@ class Hop(PlainTask):
         return {"goal_distance": goal_distance(self.creature, aim, sensed)}
 
     @override
-    def init(self) -> Tally:
+    def init(self) -> EpisodeStats:
         energy = "energy" in self.terms
         return empty(self.creature, self.horizon, energy, len(self.sub_goals))
 
     @override
     def update(
-        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Standards, aim: jax.Array
-    ) -> Tally:
-        after = updated(self.creature, self.step, tally, sensed, aim)
+        self,
+        stats: EpisodeStats,
+        sensed: Sensed,
+        torque: jax.Array,
+        standards: Standards,
+        aim: jax.Array,
+    ) -> EpisodeStats:
+        after = updated(self.creature, self.step, stats, sensed, aim)
         after = with_extras(after, sensed, torque, self.step, self.sub_goals)
         return rested(after, self.horizon, standards.rest, touches(self.creature, sensed))
 
     @override
-    def judge(self, tally: Tally, settings: HopConfig) -> dict[str, jax.Array]:
-        return fitness_terms(self.creature, self.horizon, tally)
+    def judge(self, stats: EpisodeStats, settings: HopConfig) -> dict[str, jax.Array]:
+        return fitness_terms(self.creature, self.horizon, stats)
 
-    def outcome(self, tally: Tally) -> dict[str, jax.Array]:
+    def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
         """See `Task`: final distance in m and in goal distances; s to the arrival and the end."""
-        left = away(tally)
+        left = away(stats)
         return {
             "left": left,
-            "off": left / tally.goal,
-            "arrival": tally.arrived * self.step,
-            "seconds": tally.steps * self.step,
+            "off": left / stats.goal,
+            "arrival": stats.arrived * self.step,
+            "seconds": stats.steps * self.step,
         }
 
     @override
@@ -125,8 +130,8 @@ class Hop(PlainTask):
 
 
 @pytree
-class TravelTally(hop.Tally):
-    """See `hop.Tally`; goal is the latest. reached: [] goals."""
+class TravelStats(hop.EpisodeStats):
+    """See `hop.EpisodeStats`; goal is the latest. reached: [] goals."""
 
     reached: jax.Array
 
@@ -164,30 +169,30 @@ class Travel(Hop):
         return super().senses(aim.goal, sensed)
 
     @override
-    def init(self) -> TravelTally:
-        return TravelTally(**vars(super().init()), reached=jnp.zeros((), jnp.int32))
+    def init(self) -> TravelStats:
+        return TravelStats(**vars(super().init()), reached=jnp.zeros((), jnp.int32))
 
     @override
     def update(
-        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Standards, aim: Any
+        self, stats: EpisodeStats, sensed: Sensed, torque: jax.Array, standards: Standards, aim: Any
     ) -> Any:
-        after: Any = super().update(tally, sensed, torque, standards, aim.goal)
+        after: Any = super().update(stats, sensed, torque, standards, aim.goal)
         reached = jnp.round(aim.goal / aim.spacing).astype(jnp.int32) - 1
         return dataclasses.replace(after, reached=reached)
 
-    def judge(self, tally: Tally, settings: object) -> dict[str, jax.Array]:
+    def judge(self, stats: EpisodeStats, settings: object) -> dict[str, jax.Array]:
         """See `Task`: style counts in proportion to the share of the way to the nominal goal."""
-        way = self._way(tally) / NOMINAL_GOAL
-        style = style_terms(self.creature, self.horizon, tally)
+        way = self._way(stats) / NOMINAL_GOAL
+        style = style_terms(self.creature, self.horizon, stats)
         near = jnp.clip(way, 0.0, 1.0)
         return {GOAL: 1.0 - way} | {n: near * style[n] for n in self.terms if n != GOAL}
 
-    def outcome(self, tally: Any) -> dict[str, jax.Array]:
+    def outcome(self, stats: Any) -> dict[str, jax.Array]:
         """See `Task`: goals reached, m ahead of the start, s until the end."""
         return {
-            "goals": tally.reached.astype(jnp.float32),
-            "way": self._way(tally),
-            "seconds": tally.steps * self.step,
+            "goals": stats.reached.astype(jnp.float32),
+            "way": self._way(stats),
+            "seconds": stats.steps * self.step,
         }
 
     @override
@@ -196,5 +201,5 @@ class Travel(Hop):
     ) -> dict[str, jax.Array]:
         return signed_weights(settings, generation)
 
-    def _way(self, tally: Tally) -> jax.Array:
-        return jnp.where(tally.steps > 0, tally.goal - tally.left, 0.0)
+    def _way(self, stats: EpisodeStats) -> jax.Array:
+        return jnp.where(stats.steps > 0, stats.goal - stats.left, 0.0)

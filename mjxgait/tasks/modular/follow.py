@@ -58,21 +58,21 @@ class Following(GoingTask):
 
     @override
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: jax.Array
+        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: jax.Array
     ) -> Any:
-        after = super().update(tally, sensed, torque, standards, aim)
+        after = super().update(stats, sensed, torque, standards, aim)
         return dataclasses.replace(after, light=aim, since=standards)
 
     @override
-    def way(self, tally: Any) -> jax.Array:
+    def way(self, stats: Any) -> jax.Array:
         before, now = (
-            length((tally.light - place)[: self.axes]) for place in (tally.settled, tally.place)
+            length((stats.light - place)[: self.axes]) for place in (stats.settled, stats.place)
         )
         return before - now
 
-    def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
+    def outcome(self, stats: Any) -> Mapping[str, jax.Array]:
         """See `Task`: also the time in s from which the way counted."""
-        return {**super().outcome(tally), "since": tally.since * self.step}
+        return {**super().outcome(stats), "since": stats.since * self.step}
 
 
 class FollowInWater(Following, Swim):

@@ -40,8 +40,8 @@ FASTEST_HINGE, FASTEST, FURTHEST = 20.0, 5.0, 0.08
 
 
 @pytree
-class Tally(protocol.Tally):
-    """See `protocol.Tally`.
+class EpisodeStats(protocol.EpisodeStats):
+    """See `protocol.EpisodeStats`.
 
     settled, place: [3] m, centre of mass when counting began, and now.
     light: [3] m, its place. since: [] step from which the way counts. None without a light.
@@ -106,9 +106,9 @@ class GoingTask(BlocksTask):
     axes: ClassVar[int] = 3
     dark: ClassVar[np.ndarray | None] = None
 
-    def way(self, tally: Tally) -> jax.Array:
+    def way(self, stats: EpisodeStats) -> jax.Array:
         """Straight-line distance [] in m from where counting began."""
-        return length((tally.place - tally.settled)[: self.axes])
+        return length((stats.place - stats.settled)[: self.axes])
 
     def begun(self) -> dict[str, Any]:
         """Empty statistics common to these tasks."""
@@ -124,24 +124,24 @@ class GoingTask(BlocksTask):
         }
 
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
     ) -> Any:
         """See `Task`: the place now, and when counting began."""
         assert sensed.middle is not None
         return dataclasses.replace(
-            tally,
-            steps=tally.steps + 1,
-            settled=jnp.where(tally.steps <= standards, sensed.middle, tally.settled),
+            stats,
+            steps=stats.steps + 1,
+            settled=jnp.where(stats.steps <= standards, sensed.middle, stats.settled),
             place=sensed.middle,
         )
 
-    def speed(self, tally: Tally, settings: BlocksConfig) -> jax.Array:
+    def speed(self, stats: EpisodeStats, settings: BlocksConfig) -> jax.Array:
         """Speed [] in m/s over the time that counts, even if the episode ended early."""
-        return self.way(tally) / jnp.maximum(self.horizon * self.step - settings.settle, self.step)
+        return self.way(stats) / jnp.maximum(self.horizon * self.step - settings.settle, self.step)
 
-    def outcome(self, tally: Tally) -> Mapping[str, jax.Array]:
+    def outcome(self, stats: EpisodeStats) -> Mapping[str, jax.Array]:
         """See `Task`: m from where counting began, and s until the end."""
-        return {"way": self.way(tally), "seconds": tally.steps * self.step}
+        return {"way": self.way(stats), "seconds": stats.steps * self.step}
 
 
 def length(vector: jax.Array) -> jax.Array:
@@ -159,8 +159,8 @@ LITTLE = 1e-6
 
 
 @pytree
-class SwimTally(Tally):
-    """See `alive.Tally`.
+class SwimStats(EpisodeStats):
+    """See `alive.EpisodeStats`.
 
     began: [3] kg·m/s, momentum of the body when counting began.
     given: [3] kg·m/s, from the water since then. exchanged: [] the same without directions.
@@ -180,49 +180,49 @@ class Swim(GoingTask):
     terms = tuple(field.name for field in dataclasses.fields(SwimWeights))
 
     @override
-    def init(self) -> SwimTally:
+    def init(self) -> SwimStats:
         nothing, nowhere = jnp.zeros(()), jnp.zeros(3)
-        return SwimTally(
+        return SwimStats(
             **self.begun(), began=nowhere, given=nowhere, exchanged=nothing, lacking=nothing
         )
 
     @override
     def update(
-        self, tally: SwimTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
-    ) -> SwimTally:
+        self, stats: SwimStats, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+    ) -> SwimStats:
         assert sensed.momentum is not None
         assert sensed.washed is not None
         begins, momentum, push = (
-            tally.steps <= standards,
+            stats.steps <= standards,
             sensed.momentum,
             sensed.washed * self.step,
         )
-        began = jnp.where(begins, momentum, tally.began)
-        given = jnp.where(begins, 0.0, tally.given)
+        began = jnp.where(begins, momentum, stats.began)
+        given = jnp.where(begins, 0.0, stats.given)
         lacking = jnp.where(
-            begins, 0.0, jnp.maximum(tally.lacking, length(momentum - began - given))
+            begins, 0.0, jnp.maximum(stats.lacking, length(momentum - began - given))
         )
         return dataclasses.replace(
-            super().update(tally, sensed, torque, standards, aim),
+            super().update(stats, sensed, torque, standards, aim),
             began=began,
             given=given + push,
-            exchanged=jnp.where(begins, 0.0, tally.exchanged) + length(push),
+            exchanged=jnp.where(begins, 0.0, stats.exchanged) + length(push),
             lacking=lacking,
         )
 
-    def judge(self, tally: SwimTally, settings: SwimConfig) -> Mapping[str, jax.Array]:
+    def judge(self, stats: SwimStats, settings: SwimConfig) -> Mapping[str, jax.Array]:
         """See `Task`: the speed; its loss by overlap; the loss of the rest by foreign momentum."""
-        speed = self.speed(tally, settings)
+        speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
-        inside = lost(tally.overlap / settings.overlap)
-        share = tally.lacking / jnp.maximum(tally.exchanged, LITTLE)
+        inside = lost(stats.overlap / settings.overlap)
+        share = stats.lacking / jnp.maximum(stats.exchanged, LITTLE)
         elsewhere = (1 - inside) * lost(share / settings.elsewhere)
         return {"speed": speed, "overlap": earned * inside, "elsewhere": earned * elsewhere}
 
 
 @pytree
-class RoamTally(Tally):
-    """See `alive.Tally`.
+class RoamStats(EpisodeStats):
+    """See `alive.EpisodeStats`.
 
     upwards: [3] direction in the root's axes that was up when counting began.
     upright: [] least cosine of its angle with the world's up axis since then.
@@ -240,33 +240,33 @@ class Roam(GoingTask):
     axes = 2
 
     @override
-    def init(self) -> RoamTally:
-        return RoamTally(**self.begun(), upwards=jnp.zeros(3), upright=jnp.ones(()))
+    def init(self) -> RoamStats:
+        return RoamStats(**self.begun(), upwards=jnp.zeros(3), upright=jnp.ones(()))
 
     @override
     def update(
-        self, tally: RoamTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
-    ) -> RoamTally:
+        self, stats: RoamStats, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+    ) -> RoamStats:
         assert sensed.sunk is not None
-        begins = tally.steps <= standards
-        upwards = jnp.where(begins, sensed.trunk_rot[2], tally.upwards)
+        begins = stats.steps <= standards
+        upwards = jnp.where(begins, sensed.trunk_rot[2], stats.upwards)
         upright = jnp.sum(sensed.trunk_rot[2] * upwards)
         return dataclasses.replace(
-            super().update(tally, sensed, torque, standards, aim),
-            overlap=jnp.where(begins, tally.overlap, jnp.maximum(tally.overlap, sensed.sunk)),
+            super().update(stats, sensed, torque, standards, aim),
+            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, sensed.sunk)),
             upwards=upwards,
-            upright=jnp.where(begins, 1.0, jnp.minimum(tally.upright, upright)),
+            upright=jnp.where(begins, 1.0, jnp.minimum(stats.upright, upright)),
         )
 
-    def judge(self, tally: RoamTally, settings: RoamConfig) -> Mapping[str, jax.Array]:
+    def judge(self, stats: RoamStats, settings: RoamConfig) -> Mapping[str, jax.Array]:
         """See `Task`: the speed; its loss by overlap; the loss of the rest by tipping over.
 
         Blocks overlap each other or the ground.
         """
-        speed = self.speed(tally, settings)
+        speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
-        inside = lost(tally.overlap / settings.overlap)
-        tilt = jnp.degrees(jnp.arccos(jnp.clip(tally.upright, -1.0, 1.0)))
+        inside = lost(stats.overlap / settings.overlap)
+        tilt = jnp.degrees(jnp.arccos(jnp.clip(stats.upright, -1.0, 1.0)))
         tipped = (1 - inside) * lost(tilt / settings.tilt)
         return {"speed": speed, "overlap": earned * inside, "balance": earned * tipped}
 
@@ -288,8 +288,8 @@ in the trial that it was selected by.
 
 
 @pytree
-class JumpTally(protocol.Tally):
-    """See `protocol.Tally`. heights: [SPANS] m, greatest height of the lowest part in each."""
+class JumpStats(protocol.EpisodeStats):
+    """See `protocol.EpisodeStats`. heights: [SPANS] m, greatest height of the lowest part in each."""
 
     heights: jax.Array
 
@@ -302,40 +302,40 @@ class Jump(BlocksTask):
     outcomes = ("height", "seconds")
 
     @override
-    def init(self) -> JumpTally:
+    def init(self) -> JumpStats:
         none = jnp.zeros((), jnp.int32)
-        return JumpTally(none, none, jnp.zeros(()), jnp.zeros(SPANS))
+        return JumpStats(none, none, jnp.zeros(()), jnp.zeros(SPANS))
 
     @override
     def update(
-        self, tally: JumpTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: object
-    ) -> JumpTally:
+        self, stats: JumpStats, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: object
+    ) -> JumpStats:
         assert sensed.sunk is not None
-        begins, low = tally.steps <= standards, jnp.min(sensed.geom_low)
-        span = SPANS * (tally.steps - standards) // jnp.maximum(self.horizon - standards, 1)
+        begins, low = stats.steps <= standards, jnp.min(sensed.geom_low)
+        span = SPANS * (stats.steps - standards) // jnp.maximum(self.horizon - standards, 1)
         now = (jnp.arange(SPANS) == span) & ~begins
         return dataclasses.replace(
-            tally,
-            steps=tally.steps + 1,
-            overlap=jnp.where(begins, tally.overlap, jnp.maximum(tally.overlap, sensed.sunk)),
-            heights=jnp.where(now, jnp.maximum(tally.heights, low), tally.heights),
+            stats,
+            steps=stats.steps + 1,
+            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, sensed.sunk)),
+            heights=jnp.where(now, jnp.maximum(stats.heights, low), stats.heights),
         )
 
-    def judge(self, tally: JumpTally, settings: JumpConfig) -> Mapping[str, jax.Array]:
+    def judge(self, stats: JumpStats, settings: JumpConfig) -> Mapping[str, jax.Array]:
         """See `Task`: m; its loss by overlap; the loss of the rest by an early end.
 
         Blocks overlap each other or the ground. An early end costs, because the wildest leap is the
         last.
         """
-        height = jnp.mean(tally.heights)
-        inside = lost((tally.overlap / settings.overlap) ** SHARPNESS)
-        lived = (1 - inside) * tally.steps / self.horizon
+        height = jnp.mean(stats.heights)
+        inside = lost((stats.overlap / settings.overlap) ** SHARPNESS)
+        lived = (1 - inside) * stats.steps / self.horizon
         return {
             "height": height,
             "overlap": height * inside,
             "wild": height * (1 - inside - lived),
         }
 
-    def outcome(self, tally: JumpTally) -> Mapping[str, jax.Array]:
+    def outcome(self, stats: JumpStats) -> Mapping[str, jax.Array]:
         """See `Task`: m, and s until the end."""
-        return {"height": jnp.mean(tally.heights), "seconds": tally.steps * self.step}
+        return {"height": jnp.mean(stats.heights), "seconds": stats.steps * self.step}

@@ -25,11 +25,11 @@ from mjxgait.tasks.walk.fitness import (
     wished_terms,
 )
 from mjxgait.tasks.walk.stats import (
+    EpisodeStats,
     Judge,
-    Tally,
-    WishTally,
+    TargetStats,
     along,
-    wish_tally,
+    target_stats,
     wish_updated,
     wrapped,
 )
@@ -98,25 +98,25 @@ class Walk(PlainTask):
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
     @override
-    def init(self) -> Tally:
+    def init(self) -> EpisodeStats:
         return self._keeper.init()
 
     @override
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
-    ) -> Tally:
-        return self._keeper.update(tally, sensed, torque, standards)
+        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+    ) -> EpisodeStats:
+        return self._keeper.update(stats, sensed, torque, standards)
 
     @override
-    def judge(self, tally: Any, settings: WalkConfig) -> dict[str, jax.Array]:
-        return fitness_terms(self.creature, settings, self.step, self.horizon, tally)
+    def judge(self, stats: Any, settings: WalkConfig) -> dict[str, jax.Array]:
+        return fitness_terms(self.creature, settings, self.step, self.horizon, stats)
 
-    def outcome(self, tally: Tally) -> dict[str, jax.Array]:
+    def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
         """See `Task`: m forward, m to the left and s until the end."""
         return {
-            "forward": tally.forward,
-            "aside": tally.left,
-            "seconds": tally.steps * self.step,
+            "forward": stats.forward,
+            "aside": stats.left,
+            "seconds": stats.steps * self.step,
         }
 
     @override
@@ -176,25 +176,25 @@ class AskedWalk(Walk):
         return {"heading": wrapped(heading - aim[0]), "aside": jnp.zeros(())}
 
     @override
-    def init(self) -> WishTally:
-        return wish_tally(super().init(), len(self.creature.feet.names))
+    def init(self) -> TargetStats:
+        return target_stats(super().init(), len(self.creature.feet.names))
 
     @override
     def update(
         self,
-        tally: WishTally,
+        stats: TargetStats,
         sensed: Sensed,
         torque: jax.Array,
         standards: jax.Array,
         aim: Heading,
-    ) -> WishTally:
-        plain = self._keeper.update(tally, sensed, torque, standards)
-        after = wish_updated(self.creature, tally, plain, sensed)
-        return along(tally, after, aim[0], self.horizon // 2) if aim else after
+    ) -> TargetStats:
+        plain = self._keeper.update(stats, sensed, torque, standards)
+        after = wish_updated(self.creature, stats, plain, sensed)
+        return along(stats, after, aim[0], self.horizon // 2) if aim else after
 
     @override
-    def judge(self, tally: WishTally, settings: WalkConfig) -> dict[str, jax.Array]:
-        return wished_terms(self.creature, settings, self.step, self.horizon, tally)
+    def judge(self, stats: TargetStats, settings: WalkConfig) -> dict[str, jax.Array]:
+        return wished_terms(self.creature, settings, self.step, self.horizon, stats)
 
     @override
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:

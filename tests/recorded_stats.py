@@ -1,4 +1,4 @@
-"""What an examiner's recording means for the tally, in NumPy: a second reading of tally.py."""
+"""What an examiner's recording means for the statistics, in NumPy: computed a second time."""
 
 import mujoco
 import numpy as np
@@ -71,8 +71,8 @@ def end(frames: Frames, fall: Termination | Fall | None = None) -> tuple[int, Re
     return (int(ends[0]), Reason(found[ends[0]])) if len(ends) else (len(height), Reason.FINISHED)
 
 
-def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[str, np.ndarray]:
-    """The tally of the first `steps` frames by name, without `reason`; there must be a frame more.
+def stats_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[str, np.ndarray]:
+    """The statistics of the first `steps` frames by name, without `reason`; there must be a frame more.
 
     half: frame whose distance is that of half time. clearance: m wanted of each foot in each swing.
     """

@@ -18,17 +18,24 @@ from disturbed_walks import (
     tolerance,
     watched,
 )
-from recorded_tally import Frames, end, tally_of
+from recorded_stats import Frames, end, stats_of
 
 from mjxgait.creature import Creature
 from mjxgait.tasks.base import Reason, why_fallen
-from mjxgait.tasks.walk.stats import CONTACT_GAP, Judge, Tally, WishTally, wish_tally, wish_updated
+from mjxgait.tasks.walk.stats import (
+    CONTACT_GAP,
+    EpisodeStats,
+    Judge,
+    TargetStats,
+    target_stats,
+    wish_updated,
+)
 from mjxgait.types import Sensed
 
 
 @pytest.fixture(scope="module")
 def body(tmp_path_factory: pytest.TempPathFactory) -> Creature:
-    return make_body(tmp_path_factory.mktemp("tally"))
+    return make_body(tmp_path_factory.mktemp("stats"))
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +50,7 @@ def clearance_of(body: Creature) -> float:
 
 
 def sensed_of(frames: Frames) -> Sensed:
-    """What a controller would have sensed, [T, ...]; the tally reads no bias and no velocity."""
+    """What a controller would have sensed, [T, ...]; the statistics reads no bias and no velocity."""
     count, nothing = len(frames.qpos), np.zeros((len(frames.qpos), 3))
     heights = np.zeros((count, frames.low.shape[1], 1))
     sensed = Sensed(
@@ -61,17 +68,17 @@ def sensed_of(frames: Frames) -> Sensed:
 
 
 @pytest.fixture(scope="module")
-def judged(body: Creature, recordings: list[Frames]) -> tuple[WishTally, jax.Array]:
-    """The tallies [E, ...] of whole episodes, and what would have ended them, [E, T]."""
+def judged(body: Creature, recordings: list[Frames]) -> tuple[TargetStats, jax.Array]:
+    """The statistics [E, ...] of whole episodes, and what would have ended them, [E, T]."""
     ends = body.settings.termination
     judge, clearance = Judge(body, STEP, STEPS // 2), jnp.float32(clearance_of(body))
 
-    def episode(sensed: Sensed, torque: jax.Array) -> tuple[WishTally, jax.Array]:
-        def step(tally: WishTally, now: tuple) -> tuple[WishTally, jax.Array]:
-            after = judge.update(tally, *now, clearance)
-            return wish_updated(body, tally, after, now[0]), why_fallen(body, ends, now[0])
+    def episode(sensed: Sensed, torque: jax.Array) -> tuple[TargetStats, jax.Array]:
+        def step(stats: TargetStats, now: tuple) -> tuple[TargetStats, jax.Array]:
+            after = judge.update(stats, *now, clearance)
+            return wish_updated(body, stats, after, now[0]), why_fallen(body, ends, now[0])
 
-        return jax.lax.scan(step, wish_tally(judge.init(), 4), (sensed, torque))
+        return jax.lax.scan(step, target_stats(judge.init(), 4), (sensed, torque))
 
     sensed = jax.tree.map(lambda *rows: jnp.stack(rows), *map(sensed_of, recordings))
     torque = jnp.float32([frames.torque[:STEPS] for frames in recordings])
@@ -80,16 +87,16 @@ def judged(body: Creature, recordings: list[Frames]) -> tuple[WishTally, jax.Arr
 
 @pytest.fixture(scope="module")
 def expected(body: Creature, recordings: list[Frames]) -> list[dict]:
-    return [tally_of(frames, STEPS, STEPS // 2, clearance_of(body)) for frames in recordings]
+    return [stats_of(frames, STEPS, STEPS // 2, clearance_of(body)) for frames in recordings]
 
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "reason"])
 def test_the_running_sum_is_the_sum(
-    judged: tuple[Tally, jax.Array], expected: list[dict], name: str
+    judged: tuple[EpisodeStats, jax.Array], expected: list[dict], name: str
 ):
     rows = zip(EPISODES, getattr(judged[0], name), expected, strict=True)
-    for episode, ours, tally in rows:
-        theirs = np.asarray(tally[name], float)
+    for episode, ours, stats in rows:
+        theirs = np.asarray(stats[name], float)
         most = tolerance(name, theirs)
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=most, err_msg=str(episode))
 
@@ -101,29 +108,29 @@ def test_a_foot_that_only_touches_is_down_unless_it_must_bear_weight(
     sensed = jax.tree.map(lambda leaf: leaf[0], sensed_of(recordings[0]))
     near = dataclasses.replace(sensed, geom_low=jnp.full_like(sensed.geom_low, 0.5 * CONTACT_GAP))
     judge = Judge(body, STEP, STEPS // 2, contact)
-    tally = judge.update(judge.init(), near, jnp.zeros(len(body.joints.names)), jnp.float32(0.1))
-    assert np.all(tally.contact == down)
-    assert tally.airborne == 1 - down
+    stats = judge.update(judge.init(), near, jnp.zeros(len(body.joints.names)), jnp.float32(0.1))
+    assert np.all(stats.contact == down)
+    assert stats.airborne == 1 - down
 
 
 def test_bearing_is_summed_from_the_same_moments(
-    judged: tuple[WishTally, jax.Array], recordings: list[Frames]
+    judged: tuple[TargetStats, jax.Array], recordings: list[Frames]
 ):
-    tallies = judged[0]
+    statistics = judged[0]
     for row, frames in enumerate(recordings):
         nose = frames.trunk_rot[:STEPS] @ frames.creature.frame.forward
         level = nose[:, :2] / np.linalg.norm(nose[:, :2], axis=1, keepdims=True)
         place, low = frames.place[:STEPS, :4], frames.low[:STEPS, :4]
         ahead = ((place - frames.trunk_pos[:STEPS, None, :2]) * level[:, None]).sum(2)
         moved = (ahead - [x for x, _ in LEGS.values()]) * (low < CONTACT_GAP)
-        np.testing.assert_allclose(tallies.reach[row], moved.sum(0), atol=0.02)
-        np.testing.assert_allclose(tallies.pitch[row], -np.arcsin(nose[:, 2]).sum(), atol=0.02)
-    assert np.abs(tallies.reach).max() > 0.2
-    assert np.abs(tallies.pitch).max() > 0.2
+        np.testing.assert_allclose(statistics.reach[row], moved.sum(0), atol=0.02)
+        np.testing.assert_allclose(statistics.pitch[row], -np.arcsin(nose[:, 2]).sum(), atol=0.02)
+    assert np.abs(statistics.reach).max() > 0.2
+    assert np.abs(statistics.pitch).max() > 0.2
 
 
 def test_an_episode_ends_where_the_recording_does(
-    judged: tuple[Tally, jax.Array], recordings: list[Frames]
+    judged: tuple[EpisodeStats, jax.Array], recordings: list[Frames]
 ):
     found = set()
     for episode, reasons, frames in zip(EPISODES, judged[1], recordings, strict=True):
