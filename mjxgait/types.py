@@ -89,7 +89,7 @@ class Sensed:
 
 
 @pytree
-class Judged:
+class Evaluation:
     """Results of N genomes in R trials each.
 
     terms: [N, R, F], of the fitness. outcome: [N, R, O], metrics. failed: [N, R] whether the
@@ -104,7 +104,7 @@ class Judged:
 
 
 @pytree
-class Asked:
+class RequestedTrials:
     """Trials of some genomes to run, and the known results of the others.
 
     wanted: [B, N, R]. known: leaves [B, N, R, ...], NaN where unknown; its steps, [B], are those
@@ -112,7 +112,7 @@ class Asked:
     """
 
     wanted: Number
-    known: Judged
+    known: Evaluation
 
 
 Workings = TypeVar("Workings")

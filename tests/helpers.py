@@ -36,7 +36,7 @@ from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import signed_weights, terms_under
 from mjxgait.training.blueprint import Plan
 from mjxgait.training.experiment import Batch
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 STOOL = Path(__file__).parent / "data" / "stool"
 
@@ -166,15 +166,15 @@ class Shares:
         return share - 0.9
 
 
-def made_up_judge(
+def made_up_evaluate(
     blueprint: Plan,
     numbers: object,
     settings: Config,
     starts: Starts,
     genomes: Any,
-    asked: Asked | None = None,
-) -> Judged:
-    """In place of `training.stages.judge`: a generation that simulates nothing and compiles soon.
+    asked: RequestedTrials | None = None,
+) -> Evaluation:
+    """In place of `training.stages.evaluate`: a generation that simulates nothing and compiles soon.
 
     Key poses in the middle are the best, the higher the weight of speed the more; poses that are not
     numbers have no value.
@@ -185,11 +185,11 @@ def made_up_judge(
     worth = worth[..., None, None] * starts.friction[:, None, :, None]
     wanted = jnp.ones(shape, bool) if asked is None else jnp.asarray(asked.wanted)
     lived = jnp.sum(wanted, axis=(1, 2), dtype=jnp.int32)
-    judged = Judged(
+    evaluation = Evaluation(
         terms=jnp.tile(worth, len(task.terms)),
         outcome=jnp.tile(worth, len(task.outcomes)),
         failed=~jnp.isfinite(worth[..., 0]),
         sim_steps=lived,
         computed_steps=lived,
     )
-    return judged if asked is None else completed(judged, asked)
+    return evaluation if asked is None else completed(evaluation, asked)

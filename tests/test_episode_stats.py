@@ -25,7 +25,7 @@ from mjxgait.tasks.base import Reason, why_fallen
 from mjxgait.tasks.walk.stats import (
     CONTACT_GAP,
     EpisodeStats,
-    Judge,
+    StatsRecorder,
     TargetStats,
     target_stats,
     wish_updated,
@@ -68,17 +68,17 @@ def sensed_of(frames: Frames) -> Sensed:
 
 
 @pytest.fixture(scope="module")
-def judged(body: Creature, recordings: list[Frames]) -> tuple[TargetStats, jax.Array]:
+def evaluation(body: Creature, recordings: list[Frames]) -> tuple[TargetStats, jax.Array]:
     """The statistics [E, ...] of whole episodes, and what would have ended them, [E, T]."""
     ends = body.settings.termination
-    judge, clearance = Judge(body, STEP, STEPS // 2), jnp.float32(clearance_of(body))
+    evaluate, clearance = StatsRecorder(body, STEP, STEPS // 2), jnp.float32(clearance_of(body))
 
     def episode(sensed: Sensed, torque: jax.Array) -> tuple[TargetStats, jax.Array]:
         def step(stats: TargetStats, now: tuple) -> tuple[TargetStats, jax.Array]:
-            after = judge.update(stats, *now, clearance)
+            after = evaluate.update(stats, *now, clearance)
             return wish_updated(body, stats, after, now[0]), why_fallen(body, ends, now[0])
 
-        return jax.lax.scan(step, target_stats(judge.init(), 4), (sensed, torque))
+        return jax.lax.scan(step, target_stats(evaluate.init(), 4), (sensed, torque))
 
     sensed = jax.tree.map(lambda *rows: jnp.stack(rows), *map(sensed_of, recordings))
     torque = jnp.float32([frames.torque[:STEPS] for frames in recordings])
@@ -92,9 +92,9 @@ def expected(body: Creature, recordings: list[Frames]) -> list[dict]:
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "reason"])
 def test_the_running_sum_is_the_sum(
-    judged: tuple[EpisodeStats, jax.Array], expected: list[dict], name: str
+    evaluation: tuple[EpisodeStats, jax.Array], expected: list[dict], name: str
 ):
-    rows = zip(EPISODES, getattr(judged[0], name), expected, strict=True)
+    rows = zip(EPISODES, getattr(evaluation[0], name), expected, strict=True)
     for episode, ours, stats in rows:
         theirs = np.asarray(stats[name], float)
         most = tolerance(name, theirs)
@@ -107,16 +107,18 @@ def test_a_foot_that_only_touches_is_down_unless_it_must_bear_weight(
 ):
     sensed = jax.tree.map(lambda leaf: leaf[0], sensed_of(recordings[0]))
     near = dataclasses.replace(sensed, geom_low=jnp.full_like(sensed.geom_low, 0.5 * CONTACT_GAP))
-    judge = Judge(body, STEP, STEPS // 2, contact)
-    stats = judge.update(judge.init(), near, jnp.zeros(len(body.joints.names)), jnp.float32(0.1))
+    evaluate = StatsRecorder(body, STEP, STEPS // 2, contact)
+    stats = evaluate.update(
+        evaluate.init(), near, jnp.zeros(len(body.joints.names)), jnp.float32(0.1)
+    )
     assert np.all(stats.contact == down)
     assert stats.airborne == 1 - down
 
 
 def test_bearing_is_summed_from_the_same_moments(
-    judged: tuple[TargetStats, jax.Array], recordings: list[Frames]
+    evaluation: tuple[TargetStats, jax.Array], recordings: list[Frames]
 ):
-    statistics = judged[0]
+    statistics = evaluation[0]
     for row, frames in enumerate(recordings):
         nose = frames.trunk_rot[:STEPS] @ frames.creature.frame.forward
         level = nose[:, :2] / np.linalg.norm(nose[:, :2], axis=1, keepdims=True)
@@ -130,10 +132,10 @@ def test_bearing_is_summed_from_the_same_moments(
 
 
 def test_an_episode_ends_where_the_recording_does(
-    judged: tuple[EpisodeStats, jax.Array], recordings: list[Frames]
+    evaluation: tuple[EpisodeStats, jax.Array], recordings: list[Frames]
 ):
     found = set()
-    for episode, reasons, frames in zip(EPISODES, judged[1], recordings, strict=True):
+    for episode, reasons, frames in zip(EPISODES, evaluation[1], recordings, strict=True):
         steps, why = end(frames)
         ends = np.flatnonzero(reasons)
         assert (ends[0] if len(ends) else STEPS) == min(steps, STEPS), episode

@@ -33,7 +33,7 @@ from mjxgait.evolution.state import (
     stop_reason,
 )
 from mjxgait.evolution.variation import Box, Variation, first_occurrence
-from mjxgait.types import Judged, pytree
+from mjxgait.types import Evaluation, pytree
 
 FORCED, NEVER = ForcedConfig(window=2), ForcedConfig(window=2, enabled=False)
 """Both look two generations back: the length is in the shape of the program."""
@@ -86,14 +86,14 @@ class Toy(Evolution):
         """The next state, what there is to tell, and who was born."""
         proposal = self.propose(state)
         terms = self.problem.value(proposal.offspring)[:, None, None]
-        judged = Judged(
+        evaluation = Evaluation(
             terms=terms,
             outcome=terms,
             failed=~jnp.isfinite(terms[..., 0]),
             sim_steps=jnp.int32(0),
             computed_steps=jnp.int32(0),
         )
-        return *self.absorb(state, proposal, judged), proposal.offspring
+        return *self.absorb(state, proposal, evaluation), proposal.offspring
 
 
 def toy(problem: Problem = CENTRE, **settings) -> Toy:
@@ -306,8 +306,8 @@ def test_no_verdict_of_an_earlier_judge_counts():
     keeping = toy(survival="children", elite=0.15, forced=NEVER, growth=1.5)
     (before, _), settings = run(keeping, 4)[-1], inputs(keeping)[0]
     harder = jax.device_get(advance(settings, Problem(slope=2.0), before))[0]
-    judged = np.isfinite(harder.fitness)
-    assert judged.tolist() == [True] * 10 + [False] * 10
+    evaluation = np.isfinite(harder.fitness)
+    assert evaluation.tolist() == [True] * 10 + [False] * 10
     expected = 2 * near_zero(harder.genomes)[:10]
     np.testing.assert_allclose(harder.fitness[:10], expected, rtol=1e-6)
 
@@ -409,8 +409,8 @@ def test_the_first_generation_is_the_best_of_as_many_candidates_as_asked_for(gro
     climbs = growth == 3.0
     rounds, first = [], begun(choosy, climbs=climbs)
     while int(first.generation) < 0:
-        first, _, judged = advance(*inputs(choosy), first)
-        rounds.append(near_zero(judged))
+        first, _, evaluation = advance(*inputs(choosy), first)
+        rounds.append(near_zero(evaluation))
     candidates = np.sort(np.concatenate(rounds)[:80])[::-1]
     assert len(set(candidates.tolist())) == 80
     np.testing.assert_allclose(first.fitness, candidates[:20], rtol=1e-6)

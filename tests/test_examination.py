@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import STOOL, Shares, made_up_judge, small_config
+from helpers import STOOL, Shares, made_up_evaluate, small_config
 from rich.console import Console
 
 from mjxgait.certification import (
@@ -240,7 +240,7 @@ def test_who_did_the_same_is_no_other_candidate(experiment):
     assert experiment.candidates(alike) == [0, 2, 5]
 
 
-class Asked:
+class RequestedTrials:
     """What the second level will say, and how hastily it was asked."""
 
     def __init__(self, *shares: float) -> None:
@@ -256,7 +256,7 @@ def test_who_is_to_walk_anywhere_goes_on_until_it_does(
     experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
 ):
     """The certificate alone ends no run then; who fails it is not asked for more."""
-    asked = Asked(0.5, 0.95)
+    asked = RequestedTrials(0.5, 0.95)
     monkeypatch.setattr(examination, "stress", asked)
     anywhere = {"level": "anywhere", "attempts": 4}
     state = state_with(experiment, 3)
@@ -273,7 +273,7 @@ def test_who_is_to_walk_anywhere_goes_on_until_it_does(
 def test_in_the_end_all_of_the_second_level_is_asked(
     experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
 ):
-    asked = Asked(0.5)
+    asked = RequestedTrials(0.5)
     monkeypatch.setattr(examination, "stress", asked)
     examined = examiner(experiment, exams, level="anywhere").best(ranked(experiment))
     assert examined.certificate.passed
@@ -417,7 +417,7 @@ def promising(monkeypatch: pytest.MonkeyPatch, looks: Looks) -> None:
 def made_up_verdicts() -> Iterator[None]:
     """Runs evolve, but simulate as little as what looks at them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stages, "judge", made_up_judge)
+        patch.setattr(stages, "evaluate", made_up_evaluate)
         yield
 
 

@@ -17,7 +17,7 @@ from mjxgait.tasks.walk.fitness import (
     fitness_terms,
     terms_under,
 )
-from mjxgait.tasks.walk.stats import Judge
+from mjxgait.tasks.walk.stats import StatsRecorder
 from mjxgait.tasks.walk.task import Walk
 from mjxgait.types import Sensed
 
@@ -81,7 +81,7 @@ def body(stool: Creature) -> Creature:
 def terms_of(body: Creature, stats: dict, **fitness: float) -> dict[str, float]:
     config = small_config(fitness={"speed": 0.0, **fitness}).fitness
     arrays = {name: jnp.asarray(value) for name, value in (LIVED | stats).items()}
-    filled = dataclasses.replace(Judge(body, STEP, HORIZON // 2).init(), **arrays)
+    filled = dataclasses.replace(StatsRecorder(body, STEP, HORIZON // 2).init(), **arrays)
     terms = fitness_terms(body, config, STEP, HORIZON, filled)
     return {name: float(value) for name, value in terms.items()}
 

@@ -284,8 +284,8 @@ def test_work_and_sub_goals_are_watched_only_where_they_count(stool: Creature):
     stats = tallied(on, moments, torques)
     assert stats.work == pytest.approx((3.0 + 2.0) * STEP)
     assert stats.closest == pytest.approx([0.25, 0.1], abs=1e-6)
-    judged = on.judge(stats, on.settings)
-    assert set(judged) == set(on.terms)
+    evaluation = on.evaluate(stats, on.settings)
+    assert set(evaluation) == set(on.terms)
     counted = on.weights(on.settings, jnp.int32(10))
     # Style, at half of its ramp.
     assert float(counted["energy"]) == pytest.approx(-0.05)

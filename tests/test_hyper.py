@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import STOOL, made_up_judge, program_text, small_config
+from helpers import STOOL, made_up_evaluate, program_text, small_config
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.schema import Config
@@ -157,7 +157,7 @@ def batch(request: pytest.FixtureRequest, balls: Creature) -> Iterator[Batch]:
         if request.param == "simulated":
             request.getfixturevalue("emitted_as_shipped")
         else:
-            patch.setattr(stages, "judge", made_up_judge)
+            patch.setattr(stages, "evaluate", made_up_evaluate)
         yield build_batch(balls, [variant(tables) for tables in VARIANTS.values()])
 
 

@@ -176,15 +176,15 @@ def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creatu
     assert float(task.outcome(unhurt)["bar"]) == pytest.approx(HEIGHT)
     # What counts is how deep it is in the bar where that is now.
     deep = (float(stats.bar) - 0.03) / luxo.frame.hip_height
-    terms = task.judge(stats, LimboConfig())
+    terms = task.evaluate(stats, LimboConfig())
     assert float(terms["bar"]) == pytest.approx(deep / 0.3, rel=1e-4)
-    above = task.judge(dataclasses.replace(stats, raised=jnp.float32(0.2)), LimboConfig())
+    above = task.evaluate(dataclasses.replace(stats, raised=jnp.float32(0.2)), LimboConfig())
     assert float(above["bar"]) == 0.0
     stats = dataclasses.replace(stats, raised=jnp.float32(0.0))
-    terms = task.judge(stats, LimboConfig())
+    terms = task.evaluate(stats, LimboConfig())
     deep = float(stats.bar) / luxo.frame.hip_height
     assert float(terms["bar"]) == pytest.approx(min(deep / 0.3, 1.0), rel=1e-5)
-    clear = task.judge(dataclasses.replace(stats, bar=jnp.zeros(())), LimboConfig())
+    clear = task.evaluate(dataclasses.replace(stats, bar=jnp.zeros(())), LimboConfig())
     assert float(clear["bar"]) == 0.0
     assert all(float(clear[name]) == float(terms[name]) for name in task.terms if name != "bar")
 

@@ -20,9 +20,9 @@ from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.evolution.variation import Box
 from mjxgait.training.experiment import Batch, Experiment, build_experiment
 from mjxgait.training.generation import evolution_of, first_trials
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
-Trials = tuple[Experiment, EvolutionState, GenerationMetrics, Callable[[np.ndarray], Judged]]
+Trials = tuple[Experiment, EvolutionState, GenerationMetrics, Callable[[np.ndarray], Evaluation]]
 """A run, its first generation, and the verdict on its first genomes in the wanted trials [N, R]
 alone.
 """
@@ -39,18 +39,18 @@ def half(stool: Creature) -> Trials:
     states = batch.place(batch.init())
     proposals, starts = stages.propose(numbers, rows, states)
     known = first_trials(states, proposals).known
-    assert stages.judge is not None
+    assert stages.evaluate is not None
 
-    def verdict(wanted: np.ndarray) -> Judged:
-        asked = Asked(wanted[None], known)
-        judged = stages.judge(numbers, rows.settings, starts, proposals.offspring, asked)
-        return jax.tree.map(lambda leaf: leaf[0], jax.device_get(judged))
+    def verdict(wanted: np.ndarray) -> Evaluation:
+        asked = RequestedTrials(wanted[None], known)
+        evaluation = stages.evaluate(numbers, rows.settings, starts, proposals.offspring, asked)
+        return jax.tree.map(lambda leaf: leaf[0], jax.device_get(evaluation))
 
     return experiment, state, metrics, verdict
 
 
 @pytest.fixture(scope="module")
-def everybody(half: Trials) -> Judged:
+def everybody(half: Trials) -> Evaluation:
     """The verdict on all in all trials, in the order of `genomes`."""
     return half[-1](np.ones((6, 3), bool))
 
@@ -60,9 +60,9 @@ def genomes(half: Trials) -> list[bytes]:
     return [poses.tobytes() for poses in np.asarray(half[0].init().genomes.key_poses)]
 
 
-def steps(half: Trials, judged: Judged) -> np.ndarray:
+def steps(half: Trials, evaluation: Evaluation) -> np.ndarray:
     """How long each trial lasted, [N, R]."""
-    seconds = judged.outcome[..., half[0].simulator.task.outcomes.index("seconds")]
+    seconds = evaluation.outcome[..., half[0].simulator.task.outcomes.index("seconds")]
     return np.round(seconds / float(half[0].creature.model.opt.timestep)).astype(int)
 
 
@@ -76,7 +76,9 @@ def by_genome(state: EvolutionState) -> dict[bytes, tuple[np.ndarray, float]]:
     }
 
 
-def test_who_does_best_in_the_first_start_is_judged_as_if_all_were(half: Trials, everybody: Judged):
+def test_who_does_best_in_the_first_start_is_judged_as_if_all_were(
+    half: Trials, everybody: Evaluation
+):
     experiment, state, _, _ = half
     rank = evolution_of(experiment.simulator, experiment.config).rank
     worth = np.asarray(rank(everybody.terms, jnp.int32(0)))
@@ -97,7 +99,7 @@ def test_who_does_best_in_the_first_start_is_judged_as_if_all_were(half: Trials,
             assert fitness == -np.inf
 
 
-def test_only_what_was_run_is_counted(half: Trials, everybody: Judged):
+def test_only_what_was_run_is_counted(half: Trials, everybody: Evaluation):
     """Six in the first start, three of them in two more."""
     _, some, counted, _ = half
     promoted = {genome for genome, (_, fitness) in by_genome(some).items() if np.isfinite(fitness)}
@@ -114,15 +116,15 @@ def test_only_what_was_run_is_counted(half: Trials, everybody: Judged):
 def test_quartiles_are_of_those_who_were_judged(half: Trials):
     """As the mean is; half of the population has no fitness. Between two of them it is either."""
     _, state, told, _ = half
-    judged = state.fitness[np.isfinite(state.fitness)]
-    assert 0 < len(judged) < len(state.fitness)
-    either = [np.percentile(judged, [25, 50, 75], method=side) for side in ("lower", "higher")]
+    evaluation = state.fitness[np.isfinite(state.fitness)]
+    assert 0 < len(evaluation) < len(state.fitness)
+    either = [np.percentile(evaluation, [25, 50, 75], method=side) for side in ("lower", "higher")]
     found = (told.lower_quartile, told.median, told.upper_quartile)
     assert all(one in pair for one, *pair in zip(found, *either, strict=True))
-    assert told.mean == pytest.approx(judged.mean(), rel=1e-5)
+    assert told.mean == pytest.approx(evaluation.mean(), rel=1e-5)
 
 
-def test_a_start_that_is_not_wanted_is_not_simulated(half: Trials, everybody: Judged):
+def test_a_start_that_is_not_wanted_is_not_simulated(half: Trials, everybody: Evaluation):
     """It has no verdict, and those of the others are what they are when all are wanted."""
     wanted = np.arange(18).reshape(6, 3) % 4 == 1
     some = half[-1](wanted)
@@ -134,11 +136,11 @@ def test_a_start_that_is_not_wanted_is_not_simulated(half: Trials, everybody: Ju
     assert some.computed_steps < everybody.computed_steps
 
 
-def judged_first(values: list[float]) -> Judged:
+def judged_first(values: list[float]) -> Evaluation:
     """A verdict on the first trial alone."""
     terms = jnp.full((len(values), 2, 1), jnp.nan).at[:, 0, 0].set(jnp.array(values))
     nothing = jnp.zeros((len(values), 2), bool)
-    return Judged(terms, terms, nothing, jnp.int32(0), jnp.int32(0))
+    return Evaluation(terms, terms, nothing, jnp.int32(0), jnp.int32(0))
 
 
 def promoted_of(values: list[float], share: float, seeded: int = 0, **settings: Any) -> list[int]:

@@ -34,7 +34,7 @@ from mjxgait.tasks.walk.fitness import (
 from mjxgait.tasks.walk.gaits import stride_limit
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.generation import evolution_of
-from mjxgait.types import BodyState, Judged, Sensed
+from mjxgait.types import BodyState, Evaluation, Sensed
 
 ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)
 
@@ -69,7 +69,9 @@ def simulate(experiment: Experiment, population: Genome, starts: Starts | None =
     return jax.device_get(program(experiment)(population, starts or experiment.starts))
 
 
-def judged(experiment: Experiment, population: Genome, starts: Starts | None = None) -> Judged:
+def evaluation(
+    experiment: Experiment, population: Genome, starts: Starts | None = None
+) -> Evaluation:
     verdict = jax.jit(Local(experiment.simulator).verdict)
     return verdict(experiment.row.settings, simulate(experiment, population, starts))
 
@@ -123,7 +125,7 @@ def test_a_bad_individual_does_not_touch_its_neighbours(experiment: Experiment, 
 def test_not_finite_means_the_lowest_score(experiment: Experiment):
     population = genomes(experiment, 7)
     poisoned = dataclasses.replace(population, key_poses=population.key_poses.at[2].set(jnp.nan))
-    terms = judged(experiment, poisoned).terms
+    terms = evaluation(experiment, poisoned).terms
     fitness = evolution_of(experiment.simulator, experiment.config).rank(terms, jnp.int32(0))
     assert np.isneginf(fitness[2])
     assert np.isfinite(np.delete(fitness, 2)).all()
@@ -133,7 +135,7 @@ def test_physics_that_breaks_at_once_means_the_lowest_score_too(experiment: Expe
     """Nothing has been counted then, and nothing must come of it."""
     starts = experiment.starts
     broken = dataclasses.replace(starts, qvel=starts.qvel.at[1, 0].set(jnp.nan))
-    terms = judged(experiment, genomes(experiment, 7), broken).terms
+    terms = evaluation(experiment, genomes(experiment, 7), broken).terms
     assert np.isnan(terms[:, 1]).all()
     assert np.isfinite(terms[:, 0]).all()
 
@@ -248,7 +250,7 @@ def test_the_dead_are_not_judged_on(experiment: Experiment):
     @jax.jit
     def after(reason: jax.Array, steps: jax.Array) -> object:
         lane.stats = dataclasses.replace(stats, reason=reason, steps=steps)
-        return simulator._judge(lane, sensed, torque)
+        return simulator._evaluate(lane, sensed, torque)
 
     alive = after(jnp.int32(Reason.FINISHED), jnp.int32(7))
     assert alive.steps == 8
@@ -356,11 +358,11 @@ def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
 def test_a_fall_scores_below_everybody_who_stays_up(experiment: Experiment, stool: Creature):
     """With the weights of configs/wilson.toml, whatever the distance; by default it costs nothing."""
     thesis = resolve_config({}, stool.name, Path("wilson"))
-    steps, judge = experiment.simulator.steps, experiment.simulator.task
+    steps, evaluate = experiment.simulator.steps, experiment.simulator.task
 
     def fitness(config: Config, forward: float, reason: Reason, after: int) -> float:
         stats = dataclasses.replace(
-            judge.init(),
+            evaluate.init(),
             steps=jnp.int32(after),
             reason=jnp.int32(reason),
             forward=jnp.float32(forward),

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from helpers import STOOL, made_up_judge, said_by
+from helpers import STOOL, made_up_evaluate, said_by
 
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
@@ -52,11 +52,11 @@ SMALL += ["--seed", "5", "--examination.candidates", "0", "--no-plots", "--check
 
 COMMAND = """
 import sys
-from helpers import made_up_judge
+from helpers import made_up_evaluate
 from mjxgait.cli import main
 from mjxgait.training import stages
 
-stages.judge = made_up_judge
+stages.evaluate = made_up_evaluate
 main(sys.argv[1:])
 """
 """The command, but its generations simulate nothing."""
@@ -99,7 +99,7 @@ def here() -> dict[str, str]:
 @pytest.fixture(scope="module", autouse=True)
 def nothing_is_simulated() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stages, "judge", made_up_judge)
+        patch.setattr(stages, "evaluate", made_up_evaluate)
         yield
 
 

@@ -19,7 +19,7 @@ def test_numbers_are_free(stool: Creature):
     )
     assert one == other
     assert hash(one) == hash(other)
-    assert one.name("judge") == other.name("judge") != one.name("absorb")
+    assert one.name("evaluate") == other.name("evaluate") != one.name("absorb")
 
 
 @pytest.mark.parametrize("kind", ["controller", "task"])

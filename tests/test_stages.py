@@ -19,9 +19,9 @@ class Written:
 def test_only_what_simulates_is_optimized(monkeypatch: pytest.MonkeyPatch, long: bool, level: str):
     """And a little what takes long to propose."""
     monkeypatch.setattr("jax.default_backend", lambda: "cpu")
-    written = [(part, Written()) for part in ("propose", "judge", "absorb")]
+    written = [(part, Written()) for part in ("propose", "evaluate", "absorb")]
     stages = compile_stages(written, long=long)
-    assert stages.judge == {"xla_cpu_prefer_vector_width": "512"}
+    assert stages.evaluate == {"xla_cpu_prefer_vector_width": "512"}
     assert stages.propose["xla_backend_optimization_level"] == level
     assert stages.absorb["xla_backend_optimization_level"] == "0"
 
@@ -40,5 +40,7 @@ def test_expressions_take_long_and_poses_do_not(stool: Creature):
 
 def test_other_machines_have_their_own_compilers(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("jax.default_backend", lambda: "gpu")
-    stages = compile_stages([("propose", Written()), ("judge", Written()), ("absorb", Written())])
-    assert stages.propose == stages.judge == stages.absorb == {}
+    stages = compile_stages(
+        [("propose", Written()), ("evaluate", Written()), ("absorb", Written())]
+    )
+    assert stages.propose == stages.evaluate == stages.absorb == {}

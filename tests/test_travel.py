@@ -82,11 +82,11 @@ def test_what_counts_is_the_way_and_what_is_told_are_the_goals(stool: Creature):
         goal = travel.onward(goal, sensed)
     told = travel.outcome(stats)
     assert (float(told["goals"]), float(told["way"])) == (2.0, pytest.approx(1.1, abs=1e-6))
-    terms = travel.judge(stats, TravelConfig())
+    terms = travel.evaluate(stats, TravelConfig())
     assert set(terms) == set(travel.terms)
     assert float(terms["distance"]) == pytest.approx(1 - 1.1 / NOMINAL_GOAL, abs=1e-6)
     far = dataclasses.replace(stats, goal=jnp.float32(9.0), left=jnp.float32(0.3))
-    assert float(travel.judge(far, TravelConfig())["distance"]) < -6
+    assert float(travel.evaluate(far, TravelConfig())["distance"]) < -6
 
 
 def test_a_controller_is_told_the_same_moving_goals(

@@ -32,7 +32,7 @@ def episode(stool: Creature, steps: int = STEPS, turn: float = 0.5, drift: float
             joint_vel=np.ones(4),
         )
         stats = task.update(stats, moment, TORQUE, TurnSettings(), ())
-    return task, stats, task.judge(stats, TurnSettings(rate=90.0))
+    return task, stats, task.evaluate(stats, TurnSettings(rate=90.0))
 
 
 def test_a_turn_to_the_left_counts_up_to_the_wanted_rate(stool: Creature):

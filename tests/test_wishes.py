@@ -86,15 +86,15 @@ def fitness_of(body: Creature):
     task = asked(config_of(WHIP, gait="trot", height=0.9, bounce=0.02, sway=6.0), body)
 
     @jax.jit
-    def judged(stats, config: WalkConfig) -> jax.Array:
-        terms = in_order(task.judge(stats, config), task.terms)
+    def evaluation(stats, config: WalkConfig) -> jax.Array:
+        terms = in_order(task.evaluate(stats, config), task.terms)
         weights = in_order(task.weights(config, jnp.int32(0)), task.terms)
         return score(terms[None], weights, 0.5)
 
     def fitness(stats: dict, config: WalkConfig) -> float:
         arrays = {name: jnp.asarray(value, jnp.float32) for name, value in stats.items()}
         filled = dataclasses.replace(task.init(), **arrays)
-        return float(judged(filled, config))
+        return float(evaluation(filled, config))
 
     return fitness
 

@@ -17,7 +17,7 @@ import numpy as np
 from mjxgait.certification.acceptance import acceptance_of, how_simulated
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
-from mjxgait.certification.verdict import judge
+from mjxgait.certification.verdict import verdict_on
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.processes import cores
@@ -241,4 +241,4 @@ def _cautious(well: np.ndarray, caution: float) -> float:
 
 def _worst(criteria: Sequence[Criterion]) -> float:
     """Margin of the worst criterion; infinite without criteria, so that it limits nothing."""
-    return judge(criteria).margin if criteria else np.inf
+    return verdict_on(criteria).margin if criteria else np.inf

@@ -17,7 +17,7 @@ from mjxgait.training.checkpoint import Packed, pack
 from mjxgait.training.experiment import Batch, Step
 from mjxgait.training.folder import Line
 from mjxgait.training.loop import followed, metrics_line, versions
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 Lines = list[Line]
 Result_co = TypeVar("Result_co", covariant=True)
@@ -103,7 +103,7 @@ class AdvanceIsland(Job[Advanced]):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Judge(Job[Judged]):
+class Evaluate(Job[Evaluation]):
     """Evaluate genomes [1, N, ...] on starts [1, R], with leaves in NumPy.
 
     asked: see `Evaluator`.
@@ -111,12 +111,12 @@ class Judge(Job[Judged]):
 
     genomes: object
     starts: Starts
-    asked: Asked | None = None
+    asked: RequestedTrials | None = None
 
     @override
-    def do(self, programs: Programs, recipe: Recipe) -> Judged:
-        judged: Judged = programs.judge(recipe, self.genomes, self.starts, self.asked)
-        return judged
+    def do(self, programs: Programs, recipe: Recipe) -> Evaluation:
+        evaluation: Evaluation = programs.evaluate(recipe, self.genomes, self.starts, self.asked)
+        return evaluation
 
 
 class _Way:

@@ -21,7 +21,7 @@ from mjxgait.tasks.starts import Starts
 from mjxgait.training.blueprint import Plan, draw_up
 from mjxgait.training.experiment import Batch, Shape, Step, build_batch, shape_of
 from mjxgait.training.stages import CompiledGeneration, Turn, at_once, compiled
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Programs:
         self._batches: Latest[tuple[BatchShape, Batch]] = Latest(KEPT)
         self._plans: Latest[Plan] = Latest(KEPT)
         self._stages: Latest[CompiledGeneration] = Latest(KEPT)
-        self._judges: Latest[jax.stages.Compiled] = Latest(KEPT)
+        self._evaluators: Latest[jax.stages.Compiled] = Latest(KEPT)
 
     def batch(self, recipe: Recipe) -> Batch:
         """Return the runs of a recipe."""
@@ -127,23 +127,23 @@ class Programs:
 
         return batch.bound(self._stages.find(shape, lambda: batch.stages(turn=turn)))
 
-    def judge(
-        self, recipe: Recipe, genomes: object, starts: Starts, asked: Asked | None = None
-    ) -> Judged:
+    def evaluate(
+        self, recipe: Recipe, genomes: object, starts: Starts, asked: RequestedTrials | None = None
+    ) -> Evaluation:
         """Evaluate genomes [1, N, ...], in NumPy."""
         shape, batch = self._known(recipe)
         count = jax.tree.leaves(genomes)[0].shape[1]
 
         def compile_it() -> jax.stages.Compiled:
-            program = batch.lower_judge(genomes, starts, asked)
-            with self._turn(shape.name("judge", count)):
+            program = batch.lower_evaluate(genomes, starts, asked)
+            with self._turn(shape.name("evaluate", count)):
                 return compiled(program)
 
-        program = self._judges.find((shape, count), compile_it)
+        program = self._evaluators.find((shape, count), compile_it)
         numbers, rows = batch.known
         given = (numbers, rows.settings, starts, genomes, *([] if asked is None else [asked]))
-        judged: Judged = jax.device_get(program(*given))
-        return judged
+        evaluation: Evaluation = jax.device_get(program(*given))
+        return evaluation
 
     def _known(self, recipe: Recipe) -> tuple[BatchShape, Batch]:
         """Return the runs of a recipe, and the shape of their program."""

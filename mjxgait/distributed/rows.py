@@ -10,7 +10,7 @@ import numpy as np
 
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
-from mjxgait.distributed.jobs import Advanced, AdvanceRows, Judge, Lines
+from mjxgait.distributed.jobs import Advanced, AdvanceRows, Evaluate, Lines
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
@@ -18,7 +18,7 @@ from mjxgait.tasks.starts import Starts
 from mjxgait.training.checkpoint import Checkpoints, Packed, side_by_side
 from mjxgait.training.folder import METRICS, open_run, truncate_metrics
 from mjxgait.training.stored import disk_errors
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 Tell = Callable[[int, int, Advanced | None], object]
 """Called with the generation, the last generation, and the latest result, if there is one."""
@@ -154,16 +154,20 @@ class Blocks:
         self._crew, self._recipe = scheduler, Recipe.of(creature, [config])
         self.size = block_size(config.evolution.offspring, config.rollout.block)
 
-    def judge(
-        self, genomes: object, trials: Starts, settings: Config, asked: Asked | None = None
-    ) -> Judged:
+    def evaluate(
+        self,
+        genomes: object,
+        trials: Starts,
+        settings: Config,
+        asked: RequestedTrials | None = None,
+    ) -> Evaluation:
         """See `Evaluator`. Takes one row; its settings are in the recipe."""
         genomes, trials, asked = jax.device_get((genomes, trials, asked))
         return together(self._crew.all(self._work(genomes, trials, asked)) or ())
 
     def _work(
-        self, genomes: object, trials: Starts, asked: Asked | None
-    ) -> Iterator[tuple[Recipe, Judge]]:
+        self, genomes: object, trials: Starts, asked: RequestedTrials | None
+    ) -> Iterator[tuple[Recipe, Evaluate]]:
         count = jax.tree.leaves(genomes)[0].shape[1]
         for first in range(0, count, self.size):
 
@@ -173,7 +177,7 @@ class Blocks:
                 return leaf[:, part] if leaf.ndim > 1 else leaf * (first == 0)
 
             block, known = jax.tree.map(cut, (genomes, asked))
-            yield self._recipe, Judge(block, trials, known)
+            yield self._recipe, Evaluate(block, trials, known)
 
 
 def block_size(offspring: int, most: int) -> int:
@@ -191,7 +195,7 @@ def block_size(offspring: int, most: int) -> int:
     return size
 
 
-def together(blocks: Sequence[Judged]) -> Judged:
+def together(blocks: Sequence[Evaluation]) -> Evaluation:
     """Join the results of chunks: leaves [B, n, ...] are concatenated, steps [B] are summed."""
 
     def joined(*leaves: np.ndarray) -> np.ndarray:

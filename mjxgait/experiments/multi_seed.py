@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from mjxgait.certification import judged, read_certificate
+from mjxgait.certification import read_certificate, verdict_of
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import STRICT, Whole, build, dump_toml, read_toml
 from mjxgait.creature import Creature
@@ -184,5 +184,5 @@ def _found(folder: Path) -> Found:
     document = read_certificate(folder / CERTIFICATE)
     if document is None:
         return Found(folder, False, False, "", None, "not examined")
-    verdict, summary = judged(document), document.get("report", {}).get("summary", "")
+    verdict, summary = verdict_of(document), document.get("report", {}).get("summary", "")
     return Found(folder, True, verdict.certified, summary, verdict.margin, verdict.in_words())

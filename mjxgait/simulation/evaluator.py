@@ -12,15 +12,19 @@ from mjxgait.config.schema import Config
 from mjxgait.simulation.rollout import Episodes, Simulator
 from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, in_order
 from mjxgait.tasks.starts import Starts
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 
 class Evaluator(Protocol):
     """Evaluator of the genomes of several evolution runs, the rows `B`."""
 
-    def judge(
-        self, genomes: object, trials: Starts, settings: Config, asked: Asked | None = None
-    ) -> Judged:
+    def evaluate(
+        self,
+        genomes: object,
+        trials: Starts,
+        settings: Config,
+        asked: RequestedTrials | None = None,
+    ) -> Evaluation:
         """Return the results, leaves [B, N, ...], of genomes [B, N, ...] in the trials [B, R].
 
         settings: traced, leaves [B, ...]. asked: the trials to run; None is all.
@@ -34,9 +38,13 @@ class Local:
 
     simulator: Simulator
 
-    def judge(
-        self, genomes: object, trials: Starts, settings: Config, asked: Asked | None = None
-    ) -> Judged:
+    def evaluate(
+        self,
+        genomes: object,
+        trials: Starts,
+        settings: Config,
+        asked: RequestedTrials | None = None,
+    ) -> Evaluation:
         """See `Evaluator`. Outside the simulations, each row reads only its own data."""
         wanted = None if asked is None else jnp.asarray(asked.wanted)
         episodes = self.simulator.simulate(genomes, trials, settings, wanted)
@@ -45,14 +53,14 @@ class Local:
         share = lived / jnp.maximum(jnp.sum(lived), 1)
         computed = jnp.round(episodes.computed_steps * share).astype(jnp.int32)
 
-        def of_row(row: tuple[Config, EpisodeStats, jax.Array]) -> Judged:
+        def of_row(row: tuple[Config, EpisodeStats, jax.Array]) -> Evaluation:
             settings, stats, computed = row
             return self.verdict(settings, Episodes(stats, computed))
 
-        judged = jax.lax.map(of_row, (settings, episodes.stats, computed))
-        return judged if asked is None else completed(judged, asked)
+        evaluation = jax.lax.map(of_row, (settings, episodes.stats, computed))
+        return evaluation if asked is None else completed(evaluation, asked)
 
-    def verdict(self, settings: Config, episodes: Episodes) -> Judged:
+    def verdict(self, settings: Config, episodes: Episodes) -> Evaluation:
         """Return the results of one row's episodes, statistics with leaves [N, R, ...]."""
         task, stats = self.simulator.task, episodes.stats
 
@@ -61,8 +69,8 @@ class Local:
         ) -> jax.Array:
             return jax.vmap(jax.vmap(lambda one: in_order(function(one), names)))(stats)
 
-        terms = each(partial(task.judge, settings=settings.fitness), task.terms)
-        return Judged(
+        terms = each(partial(task.evaluate, settings=settings.fitness), task.terms)
+        return Evaluation(
             terms=jnp.where((stats.reason == NONFINITE)[..., None], jnp.nan, terms),
             outcome=each(task.outcome, task.outcomes),
             failed=stats.reason != FINISHED,
@@ -71,17 +79,17 @@ class Local:
         )
 
 
-def completed(judged: Judged, asked: Asked) -> Judged:
+def completed(evaluation: Evaluation, asked: RequestedTrials) -> Evaluation:
     """Fill in the known results of the trials that were not run; all leaves [B, ...]."""
 
     def pick(new: jax.Array, known: jax.Array) -> jax.Array:
         wanted = jnp.asarray(asked.wanted)
         return jnp.where(wanted.reshape(*wanted.shape, *[1] * (new.ndim - wanted.ndim)), new, known)
 
-    return Judged(
-        terms=pick(judged.terms, asked.known.terms),
-        outcome=pick(judged.outcome, asked.known.outcome),
-        failed=pick(judged.failed, asked.known.failed),
-        sim_steps=judged.sim_steps + asked.known.sim_steps,
-        computed_steps=judged.computed_steps + asked.known.computed_steps,
+    return Evaluation(
+        terms=pick(evaluation.terms, asked.known.terms),
+        outcome=pick(evaluation.outcome, asked.known.outcome),
+        failed=pick(evaluation.failed, asked.known.failed),
+        sim_steps=evaluation.sim_steps + asked.known.sim_steps,
+        computed_steps=evaluation.computed_steps + asked.known.computed_steps,
     )

@@ -279,7 +279,7 @@ class Simulator:
         late = lane.late
         if late is not None:
             torque, late = self._per_lane(_arriving)(late, lane.stats.steps, torque)
-        stats = self._per_lane(self._judge)(lane, sensed, torque)
+        stats = self._per_lane(self._evaluate)(lane, sensed, torque)
         body = self.plant.advance(body, workings, self._per_lane(self.drive.lift)(torque))
         aim = self._per_lane(self.task.onward)(lane.aim, sensed)
         kept = command if self._holds else None
@@ -318,7 +318,7 @@ class Simulator:
         ended = self.task.ended(sensed, aim)
         return jnp.where(_finite(sensed), ended, NONFINITE).astype(jnp.int32)
 
-    def _judge(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
+    def _evaluate(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
         """Update the statistics after a step, unless the episode has ended."""
         stats = lane.stats
         going = (stats.reason == FINISHED) & (stats.steps < self.steps)

@@ -114,7 +114,7 @@ class Task(Protocol[Settings_contra, Aim, Standards, Stats]):
         """Return the statistics after one more step under this torque [J] in N·m."""
         ...
 
-    def judge(self, stats: Stats, settings: Settings_contra) -> Mapping[str, jax.Array]:
+    def evaluate(self, stats: Stats, settings: Settings_contra) -> Mapping[str, jax.Array]:
         """Fitness terms [] of an episode by name, each without unit and before its weight."""
         ...
 

@@ -21,7 +21,7 @@ from mjxgait.types import Sensed
 class PlainTask(abc.ABC):
     """Base class for user-defined tasks (docs/guide/your-own-task.md).
 
-    A subclass needs `counts`, the weight of each fitness term by name, and `judge`. Its own
+    A subclass needs `counts`, the weight of each fitness term by name, and `evaluate`. Its own
     statistics of an episode go into a `EpisodeStats` of its own. `Settings` is a frozen dataclass of
     numbers that become keys of `[fitness]`. step: s. horizon: T, steps of a full episode. ends:
     definition of a fall.
@@ -93,7 +93,7 @@ class PlainTask(abc.ABC):
         return dataclasses.replace(stats, steps=stats.steps + 1)
 
     @abc.abstractmethod
-    def judge(self, stats: Any, settings: Any) -> Mapping[str, jax.Array]:
+    def evaluate(self, stats: Any, settings: Any) -> Mapping[str, jax.Array]:
         """See `Task`."""
 
     @classmethod

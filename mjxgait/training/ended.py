@@ -10,7 +10,7 @@ from typing import cast
 
 from rich.console import Console
 
-from mjxgait.certification import judged, outdated, read_certificate
+from mjxgait.certification import outdated, read_certificate, verdict_of
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -73,7 +73,7 @@ def _certified(run: Path, creature: Creature, config: Config, stored: Stored) ->
             return None
     except UserError:
         return None
-    verdict = judged(document)
+    verdict = verdict_of(document)
     return why_ended(generation, verdict.margin) if verdict.certified else None
 
 

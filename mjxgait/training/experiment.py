@@ -22,7 +22,7 @@ from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.simulation.rollout import Episodes, Simulator
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.blueprint import Numbers, Plan, draw_up
-from mjxgait.training.generation import Row, first_state, judge
+from mjxgait.training.generation import Row, evaluate, first_state
 from mjxgait.training.stages import (
     CompiledGeneration,
     Turn,
@@ -34,7 +34,7 @@ from mjxgait.training.stages import (
     lower_stages,
     lowered,
 )
-from mjxgait.types import Asked, Tree
+from mjxgait.types import RequestedTrials, Tree
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,11 +128,11 @@ class Experiment:
 
     def compile(self, evaluator: Evaluator | None = None) -> Step:
         """Compile a generation; `evaluator` evaluates it elsewhere."""
-        return self.step(self.stages(judges=evaluator is None), evaluator)
+        return self.step(self.stages(evaluates=evaluator is None), evaluator)
 
-    def stages(self, judges: bool = True) -> CompiledGeneration:
+    def stages(self, evaluates: bool = True) -> CompiledGeneration:
         """See `Batch.stages`."""
-        return Batch((self,)).stages(judges)
+        return Batch((self,)).stages(evaluates)
 
     def step(self, stages: CompiledGeneration, evaluator: Evaluator | None = None) -> Step:
         """Return the generation with compiled programs of this shape."""
@@ -224,29 +224,29 @@ class Batch:
 
         evaluator: evaluates instead of this machine.
         """
-        return self.bound(self.stages(judges=evaluator is None), evaluator)
+        return self.bound(self.stages(evaluates=evaluator is None), evaluator)
 
-    def stages(self, judges: bool = True, turn: Turn = at_once) -> CompiledGeneration:
+    def stages(self, evaluates: bool = True, turn: Turn = at_once) -> CompiledGeneration:
         """See `compile_stages`."""
         first = self.experiments[0]
         settings = first.config.controller, first.config.evolution
         long = first.simulator.controller.variation(*settings).long
-        return compile_stages(self.lower(judges), turn, long)
+        return compile_stages(self.lower(evaluates), turn, long)
 
-    def lower(self, judges: bool = True) -> Iterator[tuple[str, jax.stages.Lowered]]:
+    def lower(self, evaluates: bool = True) -> Iterator[tuple[str, jax.stages.Lowered]]:
         """Lower the programs of a generation, equal for equal shapes; see `lower_stages`."""
-        return lower_stages(self._blueprint, self.rows, self.abstract(), judges)
+        return lower_stages(self._blueprint, self.rows, self.abstract(), evaluates)
 
     def bound(self, stages: CompiledGeneration, evaluator: Evaluator | None = None) -> Step:
         """Return the generation of these rows with compiled programs of their shape."""
         return partial(stages.step, *self.known, evaluator=evaluator)
 
-    def lower_judge(
-        self, genomes: object, starts: Starts, asked: Asked | None = None
+    def lower_evaluate(
+        self, genomes: object, starts: Starts, asked: RequestedTrials | None = None
     ) -> jax.stages.Lowered:
-        """Lower the program that evaluates genomes [B, N, ...]; see `generation.judge`."""
+        """Lower the program that evaluates genomes [B, N, ...]; see `generation.evaluate`."""
         given = (self.rows.settings, starts, genomes)
-        return lowered(self._blueprint, judge, *given, *([] if asked is None else [asked]))
+        return lowered(self._blueprint, evaluate, *given, *([] if asked is None else [asked]))
 
     @property
     def _blueprint(self) -> Plan:

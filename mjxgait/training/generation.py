@@ -1,4 +1,4 @@
-"""Parts of a generation of a batch of runs: propose, judge (and promote), absorb.
+"""Parts of a generation of a batch of runs: propose, evaluate (and promote), absorb.
 
 All but the simulations goes row by row, so that a row is independent of the others, unless it
 receives migrants from them.
@@ -26,7 +26,7 @@ from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.base import Task, in_order, score
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.blueprint import Numbers, Plan
-from mjxgait.types import Asked, Judged, pytree
+from mjxgait.types import Evaluation, RequestedTrials, pytree
 
 LEADERS = 16
 """Number of a row's best individuals that decide on the next curriculum level."""
@@ -94,8 +94,8 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
     evaluation of the rows.
     """
     count, own = sources.shape[1], jnp.arange(len(sources))[:, None]
-    judged = states.generation[:, None] >= 0
-    comes, rank = (sources != own) & judged, states.generation[:, None] % SENT
+    evaluation = states.generation[:, None] >= 0
+    comes, rank = (sources != own) & evaluation, states.generation[:, None] % SENT
 
     def seated(children: jax.Array, best: jax.Array) -> jax.Array:
         guests, last = best[sources, rank % best.shape[1]], children[:, -count:]
@@ -113,19 +113,19 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
     )
 
 
-def judge(
+def evaluate(
     blueprint: Plan,
     numbers: Numbers | None,
     settings: Config,
     starts: Starts,
     genomes: object,
-    asked: Asked | None = None,
-) -> Judged:
+    asked: RequestedTrials | None = None,
+) -> Evaluation:
     """Evaluate genomes [B, N, ...] on this machine."""
-    return Local(blueprint.simulator(numbers)).judge(genomes, starts, settings, asked)
+    return Local(blueprint.simulator(numbers)).evaluate(genomes, starts, settings, asked)
 
 
-def first_trials(states: EvolutionState, proposals: Proposal) -> Asked:
+def first_trials(states: EvolutionState, proposals: Proposal) -> RequestedTrials:
     """Request the first trial of every individual, with no known results; reads shapes only."""
     shape = (*proposals.born.shape, states.terms.shape[2])
 
@@ -134,8 +134,8 @@ def first_trials(states: EvolutionState, proposals: Proposal) -> Asked:
 
     failed: Any = np.zeros(shape, bool)
     spent: Any = np.zeros(shape[0], np.int32)
-    known = Judged(nothing(states.terms), nothing(states.outcome), failed, spent, spent)
-    return Asked(np.broadcast_to(np.arange(shape[2]) == 0, shape), known)
+    known = Evaluation(nothing(states.terms), nothing(states.outcome), failed, spent, spent)
+    return RequestedTrials(np.broadcast_to(np.arange(shape[2]) == 0, shape), known)
 
 
 def promote(
@@ -144,19 +144,19 @@ def promote(
     rows: Row,
     states: EvolutionState,
     proposals: Proposal,
-    judged: Judged,
-) -> Asked:
+    evaluation: Evaluation,
+) -> RequestedTrials:
     """Request the other trials of the best in the first, and of individuals evaluated again."""
     simulator = blueprint.simulator(numbers)
 
-    def of_row(given: tuple[Row, EvolutionState, Proposal, Judged]) -> jax.Array:
-        row, state, proposal, judged = given
+    def of_row(given: tuple[Row, EvolutionState, Proposal, Evaluation]) -> jax.Array:
+        row, state, proposal, evaluation = given
         share = row.settings.rollout.promote
-        return evolution_of(simulator, row.settings).promising(state, proposal, judged, share)
+        return evolution_of(simulator, row.settings).promising(state, proposal, evaluation, share)
 
-    wanted = jax.lax.map(of_row, (rows, states, proposals, judged))
+    wanted = jax.lax.map(of_row, (rows, states, proposals, evaluation))
     others = jnp.arange(states.terms.shape[2]) > 0
-    return Asked(wanted[..., None] & others, judged)
+    return RequestedTrials(wanted[..., None] & others, evaluation)
 
 
 def absorb(
@@ -165,20 +165,20 @@ def absorb(
     rows: Row,
     states: EvolutionState,
     proposals: Proposal,
-    judged: Judged,
+    evaluation: Evaluation,
 ) -> tuple[EvolutionState, GenerationMetrics]:
     """Complete the generation of the rows after the evaluation."""
     simulator = blueprint.simulator(numbers)
 
     def of_row(
-        given: tuple[Row, EvolutionState, Proposal, Judged],
+        given: tuple[Row, EvolutionState, Proposal, Evaluation],
     ) -> tuple[EvolutionState, GenerationMetrics]:
-        row, state, proposal, judged = given
-        after, told = evolution_of(simulator, row.settings).absorb(state, proposal, judged)
+        row, state, proposal, evaluation = given
+        after, told = evolution_of(simulator, row.settings).absorb(state, proposal, evaluation)
         after = climbed(simulator.task, row.settings.fitness, after)
         return after, dataclasses.replace(told, level=after.level)
 
-    return jax.lax.map(of_row, (rows, states, proposals, judged))
+    return jax.lax.map(of_row, (rows, states, proposals, evaluation))
 
 
 def climbed(task: Task, settings: object, state: EvolutionState) -> EvolutionState:

@@ -134,8 +134,8 @@ _COMPILED: Latest[CompiledGeneration] = Latest(2)
 
 
 def _step(experiment: Experiment, evaluator: Evaluator | None) -> Step:
-    judges = evaluator is None
-    stages = _COMPILED.find((experiment.shape, judges), lambda: experiment.stages(judges))
+    evaluates = evaluator is None
+    stages = _COMPILED.find((experiment.shape, evaluates), lambda: experiment.stages(evaluates))
     return experiment.step(stages, evaluator)
 
 

@@ -65,9 +65,9 @@ class Tryout:
         padded = np.resize(ranks, self.run.config.examination.candidates)
         genomes = jax.tree.map(lambda leaf: leaf[None, padded], state.genomes)
         numbers, rows = self._batch.known
-        judged = program(numbers, rows.settings, self._starts, genomes)
+        evaluation = program(numbers, rows.settings, self._starts, genomes)
         task, config = self._trials.simulator.task, self._trials.config
-        outcome = np.asarray(judged.outcome)[0, : len(ranks), 1:]
+        outcome = np.asarray(evaluation.outcome)[0, : len(ranks), 1:]
         seconds, creature = config.rollout.seconds, self.run.creature
         managed = [
             self._demands.managed(dict(zip(task.outcomes, one.T, strict=True)), seconds, creature)
@@ -113,7 +113,7 @@ class Tryout:
             return jax.ShapeDtypeStruct((1, count, *leaf.shape[1:]), leaf.dtype)
 
         genomes = jax.tree.map(some, self._trials.abstract().genomes)
-        return compiled(self._batch.lower_judge(genomes, self._starts))
+        return compiled(self._batch.lower_evaluate(genomes, self._starts))
 
 
 def tryout_of(experiment: Experiment) -> Tryout | None:

@@ -25,13 +25,13 @@ from mjxgait.training.blueprint import Numbers, Plan
 from mjxgait.training.generation import (
     Row,
     absorb,
+    evaluate,
     first_state,
     first_trials,
-    judge,
     promote,
     propose,
 )
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 
 def prepare_devices(devices: int | None = None, kind: str = "") -> None:
@@ -92,12 +92,12 @@ def at_once(name: str) -> AbstractContextManager[object]:
 class CompiledGeneration:
     """Compiled programs of one shape; see `generation`.
 
-    judge: None if another evaluator is used. promote: None if all individuals run all trials.
+    evaluate: None if another evaluator is used. promote: None if all individuals run all trials.
     """
 
     propose: jax.stages.Compiled
     absorb: jax.stages.Compiled
-    judge: jax.stages.Compiled | None = None
+    evaluate: jax.stages.Compiled | None = None
     promote: jax.stages.Compiled | None = None
 
     def step(
@@ -110,21 +110,21 @@ class CompiledGeneration:
         """Run a generation of the rows [B]. evaluator: replaces this machine's program."""
         proposals, starts = self.propose(numbers, rows, states)
 
-        def verdict(*asked: Asked) -> Judged:
+        def verdict(*asked: RequestedTrials) -> Evaluation:
             if evaluator is not None:
-                return evaluator.judge(proposals.offspring, starts, rows.settings, *asked)
-            assert self.judge is not None, "compiled for an evaluator elsewhere"
+                return evaluator.evaluate(proposals.offspring, starts, rows.settings, *asked)
+            assert self.evaluate is not None, "compiled for an evaluator elsewhere"
             given = (numbers, rows.settings, starts, proposals.offspring)
-            found: Judged = self.judge(*given, *asked)
+            found: Evaluation = self.evaluate(*given, *asked)
             return found
 
         if self.promote is None:
-            judged = verdict()
+            evaluation = verdict()
         else:
             first = verdict(first_trials(states, proposals))
-            judged = verdict(self.promote(numbers, rows, states, proposals, first))
+            evaluation = verdict(self.promote(numbers, rows, states, proposals, first))
         after: tuple[EvolutionState, GenerationMetrics] = self.absorb(
-            numbers, rows, states, proposals, judged
+            numbers, rows, states, proposals, evaluation
         )
         return after
 
@@ -142,11 +142,11 @@ def lowered(blueprint: Plan, function: Callable[..., object], *given: object) ->
 
 
 def lower_stages(
-    blueprint: Plan, rows: Row, states: EvolutionState, judges: bool = True
+    blueprint: Plan, rows: Row, states: EvolutionState, evaluates: bool = True
 ) -> Iterator[tuple[str, jax.stages.Lowered]]:
     """Yield the names and programs for rows and states of these shapes, each traced on demand.
 
-    judges: whether to include the program that evaluates.
+    evaluates: whether to include the program that evaluates.
     """
     first = lowered(blueprint, propose, rows, states)
     yield "propose", first
@@ -154,15 +154,17 @@ def lower_stages(
     promotes = rows.settings.rollout.promotes
     asked = (first_trials(states, proposals),) if promotes else ()
     given = (rows.settings, starts, proposals.offspring, *asked)
-    if judges:
-        middle = lowered(blueprint, judge, *given)
-        yield "judge", middle
-        judged = middle.out_info
+    if evaluates:
+        middle = lowered(blueprint, evaluate, *given)
+        yield "evaluate", middle
+        evaluation = middle.out_info
     else:
-        judged = jax.eval_shape(functools.partial(judge, blueprint), blueprint.numbers, *given)
+        evaluation = jax.eval_shape(
+            functools.partial(evaluate, blueprint), blueprint.numbers, *given
+        )
     if promotes:
-        yield "promote", lowered(blueprint, promote, rows, states, proposals, judged)
-    yield "absorb", lowered(blueprint, absorb, rows, states, proposals, judged)
+        yield "promote", lowered(blueprint, promote, rows, states, proposals, evaluation)
+    yield "absorb", lowered(blueprint, absorb, rows, states, proposals, evaluation)
 
 
 def compile_stages(
@@ -173,7 +175,7 @@ def compile_stages(
     long: whether proposing takes long (`Variation`). Crossover of expressions takes half a second
     compiled with "some" effort and three with the least; poses take a hundredth with either.
     """
-    efforts: dict[str, Effort] = {"propose": "some" if long else "least", "judge": "best"}
+    efforts: dict[str, Effort] = {"propose": "some" if long else "least", "evaluate": "best"}
 
     def in_turn(part: str, program: jax.stages.Lowered) -> jax.stages.Compiled:
         with turn(part):

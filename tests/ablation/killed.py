@@ -10,17 +10,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mjxgait.experiments.ablation import rows
-from mjxgait.experiments.ablation.rows import Judged
+from mjxgait.experiments.ablation.rows import Evaluation
 
 LAST = "2-0.json"
 """The champion at which the process is killed."""
-JUDGE = rows._judge
+JUDGE = rows._evaluate
 
 
-def judge(
+def evaluate(
     creature: Path, grounds: Sequence[str], examine: bool, champion: Path, finite: bool
-) -> Judged:
-    """In place of `rows._judge`: killed once, after a result of another champion is on disk."""
+) -> Evaluation:
+    """In place of `rows._evaluate`: killed once, after a result of another champion is on disk."""
     rows.SECONDS, study = 1.0, creature.parent
     killed = study.with_name(f"{study.name}-was-killed")
     if champion.name == LAST and not killed.exists():

@@ -20,7 +20,7 @@ import psutil
 import pyarrow.parquet
 import pytest
 from ablation import killed
-from helpers import STOOL, made_up_judge, said_by
+from helpers import STOOL, made_up_evaluate, said_by
 
 import mjxgait.processes
 from mjxgait.cli import main
@@ -100,10 +100,10 @@ def cheap() -> Iterator[None]:
     """
     programs = Programs()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stages, "judge", made_up_judge)
+        patch.setattr(stages, "evaluate", made_up_evaluate)
         patch.setattr(evolve, "LocalBackend", partial(LocalBackend, programs))
         patch.setattr(mjxgait.processes, "cores", lambda: 1)
-        patch.setattr(rows, "_judge", killed.judge)
+        patch.setattr(rows, "_evaluate", killed.evaluate)
         patch.setattr(findings, "RESAMPLES", 499)
         yield
 

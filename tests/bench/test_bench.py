@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import STOOL, made_up_judge, pose_champion, said_by, small_config
+from helpers import STOOL, made_up_evaluate, pose_champion, said_by, small_config
 
 import mjxgait.processes
 from mjxgait.bench import c_peer, contest, machine
@@ -168,10 +168,10 @@ def test_the_rivals_have_the_starts_that_a_lap_judges(stool, generation):
     assert len(experiment.starts.friction) == 11
     state = dataclasses.replace(experiment.init(), generation=jnp.int32(generation))
     work = as_workload(STOOL, experiment, state)
-    judged = next_starts(experiment.simulator.task, experiment.row, state)
+    evaluation = next_starts(experiment.simulator.task, experiment.row, state)
     assert work.episodes == len(work.key_poses) * 3
     for name in ("qpos", "qvel", "friction", "push", "push_step"):
-        np.testing.assert_array_equal(getattr(work, name), np.asarray(getattr(judged, name)))
+        np.testing.assert_array_equal(getattr(work, name), np.asarray(getattr(evaluation, name)))
     later = 1 + 2 * (generation + 1)
     np.testing.assert_array_equal(work.qpos[1:], experiment.starts.qpos[later : later + 2])
 
@@ -304,7 +304,7 @@ MADE_UP_COST = {"flops_asked": 2.0, "flops": 3.0, "bytes": 5.0, "state_bytes": 1
 @pytest.fixture
 def unsimulated(monkeypatch):
     """We simulate nothing, so that only evolution is compiled; the rivals run on one core."""
-    monkeypatch.setattr(stages, "judge", made_up_judge)
+    monkeypatch.setattr(stages, "evaluate", made_up_evaluate)
     monkeypatch.setattr(contest, "step_cost", lambda experiment: MADE_UP_COST)
     for module in (contest, machine, c_peer, mjxgait.processes):
         monkeypatch.setattr(module, "cores", lambda: 1)

@@ -156,7 +156,7 @@ def test_heights_and_ways_are_watched_frame_by_frame(experiment: Experiment, fir
     assert max(highest) > 0
 
 
-def judged(
+def evaluation(
     task: Roam, tilt: float = 0.0, sunk: float = 0.0, before: float = 0.0
 ) -> dict[str, float]:
     """Of one that goes on at 1 m/s. tilt: deg at a moment in between; before: before it counts."""
@@ -174,7 +174,7 @@ def judged(
             sunk=jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
         )
         stats = task.update(stats, sensed, jnp.zeros(3), standards, ())
-    return {name: float(value) for name, value in task.judge(stats, settings).items()}
+    return {name: float(value) for name, value in task.evaluate(stats, settings).items()}
 
 
 @pytest.fixture(scope="module")
@@ -185,14 +185,14 @@ def task(experiment: Experiment) -> Roam:
 
 
 def test_level_ways_count_from_when_it_has_settled(task: Roam):
-    calm = judged(task, before=90.0)
+    calm = evaluation(task, before=90.0)
     # The last moment is the one before the end.
     assert calm["speed"] == pytest.approx(1.0, rel=0.02)
     assert calm["overlap"] == calm["balance"] == pytest.approx(0, abs=1e-6)
 
 
 def test_to_tip_over_costs_speed(task: Roam):
-    leaning, over = (judged(task, tilt=tilt) for tilt in (RoamConfig().tilt, 180.0))
+    leaning, over = (evaluation(task, tilt=tilt) for tilt in (RoamConfig().tilt, 180.0))
     assert leaning["balance"] == pytest.approx(leaning["speed"] / 2, rel=1e-3)
     assert over["balance"] > 0.9 * over["speed"]
     assert leaning["overlap"] == 0
@@ -211,7 +211,7 @@ def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
             deep = jnp.float32(sunk if k == 100 else -1.0)
             sensed = dataclasses.replace(CALM, geom_low=low, sunk=deep)
             stats = jumping.update(stats, sensed, jnp.zeros(3), standards, ())
-        return {name: float(value) for name, value in jumping.judge(stats, settings).items()}
+        return {name: float(value) for name, value in jumping.evaluate(stats, settings).items()}
 
     assert jumped(again=0.3) == pytest.approx({"height": 0.3, "overlap": 0, "wild": 0})
     assert jumped() == pytest.approx({"height": 0.15, "overlap": 0, "wild": 0})
@@ -222,14 +222,14 @@ def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
     half = dataclasses.replace(
         jumping.init(), heights=jnp.full(SPANS, 0.3), steps=jnp.int32(task.horizon // 2)
     )
-    assert float(jumping.judge(half, settings)["wild"]) == pytest.approx(0.15)
+    assert float(jumping.evaluate(half, settings)["wild"]) == pytest.approx(0.15)
 
 
 def test_to_sink_into_the_ground_costs_speed(task: Roam):
-    touching, deep = (judged(task, sunk=sunk) for sunk in (RoamConfig().overlap, 1.0))
+    touching, deep = (evaluation(task, sunk=sunk) for sunk in (RoamConfig().overlap, 1.0))
     assert touching["overlap"] == pytest.approx(touching["speed"] / 2, rel=1e-3)
     assert deep["overlap"] > 0.99 * deep["speed"]
-    both = judged(task, tilt=180.0, sunk=1.0)
+    both = evaluation(task, tilt=180.0, sunk=1.0)
     assert both["overlap"] + both["balance"] < both["speed"]
 
 
@@ -244,8 +244,10 @@ def test_to_follow_is_to_get_nearer_to_the_light(task: Roam, follower: type):
             sensed = dataclasses.replace(CALM, middle=jnp.array([2.0 * k, 0.0, 0.0]))
             stats = following.update(stats, sensed, jnp.zeros(3), standards, jnp.array(light))
         assert float(following.way(stats)) == pytest.approx(way, abs=1e-3)
-        judged = following.judge(dataclasses.replace(stats, overlap=jnp.float32(1.0)), settings)
-        assert (judged["overlap"] > 0) == (way > 0), "nothing is gained by blocks in each other"
+        evaluation = following.evaluate(
+            dataclasses.replace(stats, overlap=jnp.float32(1.0)), settings
+        )
+        assert (evaluation["overlap"] > 0) == (way > 0), "nothing is gained by blocks in each other"
 
 
 @pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])

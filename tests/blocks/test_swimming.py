@@ -102,7 +102,7 @@ def test_what_is_faster_or_bent_further_than_anything_alive_ends(experiment: Exp
     assert [int(task.ended(each, ())) for each in (wild, bent)] == [1, 1]
 
 
-def judged(task: Swim, given: float, overlap: float = 0.0) -> dict[str, float]:
+def evaluation(task: Swim, given: float, overlap: float = 0.0) -> dict[str, float]:
     """Of one of 2 kg that the water pushes with 3 N along x: `given` is the share of its momentum
     that is the water's. Counting begins in motion."""
     settings, step = SwimConfig(settle=0.1), task.step
@@ -117,13 +117,13 @@ def judged(task: Swim, given: float, overlap: float = 0.0) -> dict[str, float]:
         stats = task.update(stats, sensed, jnp.zeros(3), standards, ())
         place += momentum / 2 * step
     stats = dataclasses.replace(stats, overlap=jnp.float32(overlap))
-    return {name: float(value) for name, value in task.judge(stats, settings).items()}
+    return {name: float(value) for name, value in task.evaluate(stats, settings).items()}
 
 
 def test_momentum_that_the_water_did_not_give_costs_speed(experiment: Experiment):
     task = experiment.simulator.task
     assert isinstance(task, Swim)
-    clean, doubtful, stolen = (judged(task, share) for share in (1.0, 1 / 1.02, 0.5))
+    clean, doubtful, stolen = (evaluation(task, share) for share in (1.0, 1 / 1.02, 0.5))
     assert clean["elsewhere"] == pytest.approx(0, abs=1e-3 * clean["speed"])
     assert doubtful["elsewhere"] == pytest.approx(0.5 * doubtful["speed"], rel=0.1)
     assert stolen["elsewhere"] > 0.99 * stolen["speed"] > 0
@@ -133,10 +133,10 @@ def test_momentum_that_the_water_did_not_give_costs_speed(experiment: Experiment
 def test_blocks_in_each_other_cost_speed(experiment: Experiment):
     task = experiment.simulator.task
     assert isinstance(task, Swim)
-    touching, deep = judged(task, 1.0, SwimConfig().overlap), judged(task, 1.0, 1.0)
+    touching, deep = evaluation(task, 1.0, SwimConfig().overlap), evaluation(task, 1.0, 1.0)
     assert touching["overlap"] == pytest.approx(touching["speed"] / 2)
     assert deep["overlap"] > 0.99 * deep["speed"]
-    both = judged(task, 0.5, 1.0)
+    both = evaluation(task, 0.5, 1.0)
     assert both["overlap"] + both["elsewhere"] < both["speed"]
 
 

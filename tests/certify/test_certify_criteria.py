@@ -18,7 +18,7 @@ CONFIG = CertificateConfig()
 def failures(recording, halved=None, started=1.0, pushed=1.0):
     """Numbers of the failed criteria."""
     window = recording.window(CONFIG.warmup)
-    judged = (
+    evaluation = (
         *acceptance.basic(recording, CONFIG),
         criteria.starts(started, CONFIG),
         criteria.pushes(pushed, CONFIG),
@@ -27,8 +27,8 @@ def failures(recording, halved=None, started=1.0, pushed=1.0):
         criteria.physics(window, CONFIG.physics),
         criteria.parts(window, CONFIG.parts),
     )
-    assert [c.number for c in judged] == list(range(1, 10))
-    return {c.number for c in judged if not c.passed}
+    assert [c.number for c in evaluation] == list(range(1, 10))
+    return {c.number for c in evaluation if not c.passed}
 
 
 def changed(recording, **arrays):

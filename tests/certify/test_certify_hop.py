@@ -63,9 +63,9 @@ def changed(at: float, **values: object) -> Recording:
 
 
 def failures(whole: Recording, halved: Recording | None = None) -> set[int]:
-    judged = DEMANDS.undisturbed(whole, halved or good(), CONFIG)
-    assert [c.number for c in judged] == [1, 2, 6, 8, 9]
-    return {c.number for c in judged if not c.passed}
+    evaluation = DEMANDS.undisturbed(whole, halved or good(), CONFIG)
+    assert [c.number for c in evaluation] == [1, 2, 6, 8, 9]
+    return {c.number for c in evaluation if not c.passed}
 
 
 def test_who_arrives_and_stays_passes():

@@ -141,7 +141,7 @@ FRAUDS: dict[str, Callable[[], Recording]] = {
 }
 
 
-def judged(recording: Recording) -> list[Criterion]:
+def evaluation(recording: Recording) -> list[Criterion]:
     """All criteria that one recording decides by itself."""
     window = recording.window(CONFIG.warmup)
     return [
@@ -158,28 +158,28 @@ def failed(*of: Criterion) -> set[str]:
 
 
 def test_every_measure_has_its_fraud():
-    names = [measure.name for criterion in judged(walk()) for measure in criterion.measures]
+    names = [measure.name for criterion in evaluation(walk()) for measure in criterion.measures]
     assert set(names) == set(FRAUDS)
     assert len(names) == len(set(names))
 
 
 @pytest.mark.parametrize("name", FRAUDS)
 def test_one_measure_fails_alone(name: str):
-    assert failed(*judged(FRAUDS[name]())) == {name}
+    assert failed(*evaluation(FRAUDS[name]())) == {name}
 
 
 def test_a_good_walk_fails_none():
-    assert failed(*judged(walk())) == set()
+    assert failed(*evaluation(walk())) == set()
 
 
 def test_a_joint_may_not_pass_either_end_of_its_range():
-    assert failed(*judged(once("joint_pos", 0.65)())) == {"joint past its range (rad)"}
+    assert failed(*evaluation(once("joint_pos", 0.65)())) == {"joint past its range (rad)"}
 
 
 def test_shares_of_starts_and_pushes():
-    for judge, least in ((criteria.starts, 0.9), (criteria.pushes, 0.8)):
-        assert failed(judge(least, CONFIG)) == set()
-        assert failed(judge(least - 0.01, CONFIG)) == {"share that stays up"}
+    for evaluate, least in ((criteria.starts, 0.9), (criteria.pushes, 0.8)):
+        assert failed(evaluate(least, CONFIG)) == set()
+        assert failed(evaluate(least - 0.01, CONFIG)) == {"share that stays up"}
 
 
 @pytest.mark.parametrize(
@@ -198,4 +198,4 @@ def test_half_the_time_step(halved: Callable[[], Recording], name: str):
 
 def test_a_longer_body_is_slower_in_its_own_lengths():
     long = dataclasses.replace(DOG, body_length=2.0)
-    assert failed(*judged(changed(walk(), dimensions=long))) == {"speed (body lengths/s)"}
+    assert failed(*evaluation(changed(walk(), dimensions=long))) == {"speed (body lengths/s)"}

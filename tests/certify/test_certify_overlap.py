@@ -253,8 +253,8 @@ def test_a_body_whose_legs_cross_fails_the_ninth_criterion_and_is_told_which(sho
     for leg in LEGS:
         poses[:, column[f"{leg}_hip"]] = 0.5 if leg.startswith("front") else -0.5
     crossed = make_champion(short, poses)
-    judged = {c.number: c for c in nominal_check(short, crossed, SHORT).criteria}
-    assert not judged[9].passed
+    evaluation = {c.number: c for c in nominal_check(short, crossed, SHORT).criteria}
+    assert not evaluation[9].passed
     worst = worst_overlap(record(short, crossed, 2.0).window(0.5))
     assert {part.split("_")[0] for part in worst["parts"]} == {"front", "hind"}
     assert worst["depth"] > 0.02 * short.frame.hip_height

@@ -63,9 +63,9 @@ def jump(height: float, until: float = 22.0, since: float = 0.0) -> Recording:
 
 
 def failures(whole: Recording) -> set[int]:
-    judged = DEMANDS.undisturbed(whole, whole, CONFIG)
-    assert sorted(c.number for c in judged) == [1, 2, 6, 8, 9]
-    return {c.number for c in judged if not c.passed}
+    evaluation = DEMANDS.undisturbed(whole, whole, CONFIG)
+    assert sorted(c.number for c in evaluation) == [1, 2, 6, 8, 9]
+    return {c.number for c in evaluation if not c.passed}
 
 
 def test_who_gets_on_walks():
@@ -117,9 +117,9 @@ def test_how_deep_a_block_is_in_the_ground_is_told_in_its_sizes():
 
 def test_who_is_off_the_ground_over_and_over_jumps():
     def failed(whole: Recording, halved: Recording) -> set[int]:
-        judged = JumpCriteria().undisturbed(whole, halved, CONFIG)
-        assert [c.number for c in judged] == [2, 6, 8, 9]
-        return {c.number for c in judged if not c.passed}
+        evaluation = JumpCriteria().undisturbed(whole, halved, CONFIG)
+        assert [c.number for c in evaluation] == [2, 6, 8, 9]
+        return {c.number for c in evaluation if not c.passed}
 
     assert not failed(jump(0.11), jump(0.12))
     assert failed(jump(0.09), jump(0.09)) == {2, 6}

@@ -12,10 +12,10 @@ from mjxgait.certification import (
     CertificateConfig,
     Criterion,
     certify,
-    judge,
-    judged,
+    evaluate,
     outdated,
     read_certificate,
+    verdict_of,
 )
 from mjxgait.certification.validity import differences
 from mjxgait.champion import read_champion, write_champion
@@ -140,36 +140,38 @@ def test_a_certificate_is_of_one_task_and_one_ground(run, tiny, trotter, change,
 
 
 def test_without_criteria_nothing_has_passed():
-    assert not judge(()).passed
-    assert not judge((Criterion(2, "progress", ()),)).passed
-    assert not judged(made_up_certificate("", criteria=[])).passed
+    assert not evaluate(()).passed
+    assert not evaluate((Criterion(2, "progress", ()),)).passed
+    assert not verdict_of(made_up_certificate("", criteria=[])).passed
 
 
 def test_a_stored_verdict_is_derived_from_its_measures():
     good, bad = made_up_certificate("", margin=0.25), made_up_certificate("", (2, "progress"))
-    assert judged(good).certified
-    assert judged(good).margin == pytest.approx(0.25)
+    assert verdict_of(good).certified
+    assert verdict_of(good).margin == pytest.approx(0.25)
     for lie in ({"passed": True}, {"passed": True, "margin": 0.9}):
-        verdict = judged(bad | lie)
+        verdict = verdict_of(bad | lie)
         assert not verdict.passed
         assert verdict.margin == pytest.approx(-0.5)
         assert verdict.contradiction.endswith("it says passed, its measures say failed")
-    assert not judged(good | {"passed": False}).certified
+    assert not verdict_of(good | {"passed": False}).certified
     criteria = [bad["criteria"][0] | {"passed": True}]
-    assert judged(bad | {"criteria": criteria}).contradiction.endswith("otherwise of criteria 2")
+    assert verdict_of(bad | {"criteria": criteria}).contradiction.endswith(
+        "otherwise of criteria 2"
+    )
 
 
 def test_a_certificate_of_an_earlier_version_has_the_margin_that_it_says():
     document = made_up_certificate("", margin=0.25)
     del document["criteria"][0]["measures"][0]["room"]
-    assert judged(document).margin == pytest.approx(0.25)
-    assert judged(document).certified
+    assert verdict_of(document).margin == pytest.approx(0.25)
+    assert verdict_of(document).certified
 
 
 def test_other_thresholds_are_told_but_not_those_of_other_tasks():
     def rules(task="walk", **tables):
         config = build(CertificateConfig, tables, "test")
-        return judged(made_up_certificate("", task=task, config=config))
+        return verdict_of(made_up_certificate("", task=task, config=config))
 
     lax = rules(progress={"drift": 5.0}, seconds=4.0)
     assert lax.passed
@@ -182,7 +184,7 @@ def test_other_thresholds_are_told_but_not_those_of_other_tasks():
     assert rules(hop={"near": 0.5}).certified
     assert not rules("hop", hop={"near": 0.5}).certified
     assert not rules("follow", swim={"speed": 0.01}).certified
-    assert not judged(made_up_certificate("") | {"config": None}).certified
+    assert not verdict_of(made_up_certificate("") | {"config": None}).certified
 
 
 def test_an_examination_again_is_compared_measure_by_measure(run, tiny, trotter):

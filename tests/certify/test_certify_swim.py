@@ -56,9 +56,9 @@ def swim(speed: Any = SPEED, aside: Any = 0.0, extra: float = 0.0) -> Recording:
 
 
 def failures(whole: Recording, halved: Recording | None = None) -> set[int]:
-    judged = DEMANDS.undisturbed(whole, halved or swim(), CONFIG)
-    assert [c.number for c in judged] == [2, 6, 8, 9, 11]
-    return {c.number for c in judged if not c.passed}
+    evaluation = DEMANDS.undisturbed(whole, halved or swim(), CONFIG)
+    assert [c.number for c in evaluation] == [2, 6, 8, 9, 11]
+    return {c.number for c in evaluation if not c.passed}
 
 
 def changed(**values: float) -> Recording:

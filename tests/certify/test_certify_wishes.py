@@ -62,8 +62,8 @@ def test_the_least_speed_and_stride_follow_what_is_asked():
 def test_who_does_just_what_was_asked_has_room(speed: float):
     """However slow that is: a run goes on until its walk has some."""
     asked = walk(speed=speed, period=0.9)
-    judged = acceptance_of("walk", {"speed": speed}).undisturbed(asked, asked, CONFIG)
-    speeds = [m for c in judged for m in c.measures if "speed" in m.name and "body" in m.name]
+    evaluation = acceptance_of("walk", {"speed": speed}).undisturbed(asked, asked, CONFIG)
+    speeds = [m for c in evaluation for m in c.measures if "speed" in m.name and "body" in m.name]
     assert min(m.margin for m in speeds) > 0.3
 
 
@@ -117,8 +117,8 @@ def test_posture_is_held_from_both_sides():
 
 def test_a_missed_wish_names_the_number_in_its_way():
     quick = walk(speed=0.8, period=0.4)
-    judged = acceptance_of("walk", {"speed": 1.5}).undisturbed(quick, quick, CONFIG)
-    assert "1.5 m/s" in in_the_way(judged)
+    evaluation = acceptance_of("walk", {"speed": 1.5}).undisturbed(quick, quick, CONFIG)
+    assert "1.5 m/s" in in_the_way(evaluation)
     assert in_the_way([as_asked(walk(), {"speed": 0.8}, CONFIG)]) is None
 
 

@@ -161,7 +161,7 @@ def test_evolution_misses_what_the_examiner_does(natural: Walk):
 )
 def test_what_is_unlike_an_animal_costs(natural: Walk, less: dict):
     config = small_config(fitness={"wish": ANIMAL}).fitness
-    like, unlike = (natural.judge(stats_of(natural, 0.5, **how), config) for how in ({}, less))
+    like, unlike = (natural.evaluate(stats_of(natural, 0.5, **how), config) for how in ({}, less))
     worse = [n for n in LIKENESS if float(unlike[n]) > float(like[n]) + 0.05]
     assert worse == ["duty_factor" if "duty" in less else next(iter(less))]
 
@@ -170,7 +170,7 @@ def test_who_never_lifts_a_foot_is_compared_all_the_same(natural: Walk):
     config = small_config(fitness={"wish": ANIMAL}).fitness
     drags = stats_of(natural, 0.5, swings=np.zeros(4))
     for stats in (drags, dataclasses.replace(drags, steps=jnp.int32(1)), natural.init()):
-        terms = natural.judge(stats, config)
+        terms = natural.evaluate(stats, config)
         assert all(np.isfinite(float(value)) for value in terms.values())
 
 

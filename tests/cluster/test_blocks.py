@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 import pytest
-from helpers import made_up_judge, small_config
+from helpers import made_up_evaluate, small_config
 
 from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import AdvanceRows
@@ -49,7 +49,7 @@ def test_a_generation_by_blocks_is_that_of_one_program(
     """Who was judged, in which order, and what it cost; terms to the rounding of another program."""
     if not simulated:
         for module in (stages, experiment):  # of whole populations, and of blocks
-            monkeypatch.setattr(module, "judge", made_up_judge)
+            monkeypatch.setattr(module, "evaluate", made_up_evaluate)
     config = small_config(rollout={"block": 3, "promote": promote})
     run = build_experiment(stool, config)
     alone = run.compile()

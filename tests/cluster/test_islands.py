@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import STOOL, made_up_judge, said_by, small_config
+from helpers import STOOL, made_up_evaluate, said_by, small_config
 from rich.console import Console
 
 import mjxgait
@@ -30,7 +30,7 @@ PROGRAMS = Programs()
 @pytest.fixture(scope="module", autouse=True)
 def nothing_is_simulated() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stages, "judge", made_up_judge)
+        patch.setattr(stages, "evaluate", made_up_evaluate)
         yield
 
 

@@ -18,7 +18,7 @@ from mjxgait.tasks.plain import PlainTask
 class Idle(PlainTask):
     terms = ("nothing",)
 
-    def judge(self, stats, settings):
+    def evaluate(self, stats, settings):
         return {"nothing": 0.0 * stats.steps}
 """
 

@@ -53,12 +53,12 @@ def untried(tryout: Tryout) -> Callable[..., SimpleNamespace]:
     """Stand in for `Tryout._program`: made-up outcomes, and no program is compiled."""
     names = tryout._trials.simulator.task.outcomes
 
-    def judged(numbers: Any, settings: Any, starts: Any, genomes: Any) -> SimpleNamespace:
+    def evaluation(numbers: Any, settings: Any, starts: Any, genomes: Any) -> SimpleNamespace:
         individuals, trials = (jax.tree.leaves(rows)[0].shape[1] for rows in (genomes, starts))
         outcome = np.broadcast_to(_made_up(len(names)), (1, individuals, trials, len(names)))
         return SimpleNamespace(outcome=outcome)
 
-    return judged
+    return evaluation
 
 
 def _made_up(count: int) -> np.ndarray:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import STOOL, made_up_certificate, made_up_judge, small_config
+from helpers import STOOL, made_up_certificate, made_up_evaluate, small_config
 from keys.made import swings, write
 from PIL import Image
 from viewing.made_up import treading
@@ -151,7 +151,7 @@ def test_from_a_file_to_a_run_that_can_be_gone_on_with(
     tmp_path: Path, capsys, stool: Creature, monkeypatch
 ):
     """Its generations simulate nothing; `test_library` simulates a run."""
-    monkeypatch.setattr(stages, "judge", made_up_judge)
+    monkeypatch.setattr(stages, "evaluate", made_up_evaluate)
     (tmp_path / "small.toml").write_text(SETTINGS)
     file, run = write(tmp_path, "bvh", stool, swings(stool)), tmp_path / "run"
     given = ("--env", STOOL, "--keys", file, "--config", tmp_path / "small.toml", "--keep", 0.8)

@@ -30,7 +30,7 @@ from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
 from mjxgait.tasks.base import DEEP, TOUCHING, Reason
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import fitness_terms
-from mjxgait.tasks.walk.stats import EpisodeStats, Judge
+from mjxgait.tasks.walk.stats import EpisodeStats, StatsRecorder
 from mjxgait.types import BodyState
 
 LANES = 6
@@ -271,10 +271,10 @@ def test_the_long_edges_of_a_box_are_hardly_bare(size: str):
 
 def test_the_statistics_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
     """Not of a lane whose episode has ended, nor of one whose state is not a number."""
-    judge = Judge(stool, 0.005, 8)
+    evaluate = StatsRecorder(stool, 0.005, 8)
     steps = jnp.array([CHECK_EVERY, CHECK_EVERY, 100, CHECK_EVERY, CHECK_EVERY])
     reasons = [Reason.FINISHED, Reason.FINISHED, Reason.FINISHED, Reason.TIPPED, Reason.FINISHED]
-    stats = jax.tree.map(lambda leaf: jnp.stack([leaf] * 5), judge.init())
+    stats = jax.tree.map(lambda leaf: jnp.stack([leaf] * 5), evaluate.init())
     stats = dataclasses.replace(
         stats,
         steps=steps,
@@ -300,7 +300,7 @@ def term(creature: Creature, stats: EpisodeStats, forward: float) -> float:
 
 
 def test_the_term_grows_with_depth_and_counts_as_far_as_there_is_a_walk(stool: Creature):
-    empty = Judge(stool, 0.005, 8).init()
+    empty = StatsRecorder(stool, 0.005, 8).init()
 
     def at(depth: float, forward: float = 1.0) -> float:
         metres = jnp.float32(depth * stool.frame.hip_height)

@@ -45,15 +45,15 @@ def test_a_run_without_a_champion_has_its_curves(stool, tmp_path):
 
 
 @pytest.mark.parametrize("judged", [True, False])
-def test_a_curve_tells_of_a_middle_half_only_where_the_log_does(judged):
+def test_a_curve_tells_of_a_middle_half_only_where_the_log_does(evaluation):
     lines = [metrics_line(generation) for generation in range(3)]
-    if not judged:
+    if not evaluation:
         lines = [line | {"lower_quartile": None, "upper_quartile": None} for line in lines]
     with figure((4, 3)) as drawing:
         axes = drawing.subplots()
         draw_fitness(axes, lines)
         told = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert ("middle half" in told) == judged
+    assert ("middle half" in told) == evaluation
     assert {"best", "mean"} <= set(told)
 
 

@@ -216,7 +216,7 @@ The starts are perturbed as in the certificate, and unseen in evolution.
 
 Ways = dict[str, tuple[float, float]]
 """A champion's `walk` and `up` on each ground."""
-Judged = tuple[Ways, bool | None]
+Evaluation = tuple[Ways, bool | None]
 """A champion's `Ways` and the `certified` of its `Result`."""
 
 
@@ -286,12 +286,12 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
     again = f"mjxgait ablate --resume {folder}"
     with survivable(folder, again), process_per_core(len(missing), prepare) as pool:
         found = pool.map(
-            partial(_judge, folder / CREATURE, plan.study.grounds, plan.study.certify),
+            partial(_evaluate, folder / CREATURE, plan.study.grounds, plan.study.certify),
             [champion_path(folder, plan, run) for run in missing],
             [_found_somebody(lines[run.variant, run.seed]) for run in missing],
         )
-        for number, (run, judged) in enumerate(zip(missing, found, strict=True), 1):
-            result = _result(plan.study, run, lines[run.variant, run.seed], judged)
+        for number, (run, evaluation) in enumerate(zip(missing, found, strict=True), 1):
+            result = _result(plan.study, run, lines[run.variant, run.seed], evaluation)
             known[result.variant, result.seed] = result
             with disk_errors(folder), (folder / MEASURED).open("a", encoding="utf-8") as log:
                 log.write(json.dumps(dataclasses.asdict(result)) + "\n")
@@ -303,8 +303,8 @@ def _measured(folder: Path) -> list[Line]:
     return read_records(folder / MEASURED, Result)
 
 
-def _result(study: Study, run: Run, lines: Sequence[Line], judged: Judged) -> Result:
-    ways, certified = judged
+def _result(study: Study, run: Run, lines: Sequence[Line], evaluation: Evaluation) -> Result:
+    ways, certified = evaluation
     walk, up = ways[study.grounds[0]]
     best = [-math.inf if line["best"] is None else line["best"] for line in lines]
     finite, threshold = _found_somebody(lines), study.threshold
@@ -329,9 +329,9 @@ def _found_somebody(lines: Sequence[Line]) -> bool:
     return lines[-1]["best"] is not None
 
 
-def _judge(
+def _evaluate(
     creature_folder: Path, grounds: Sequence[str], examine: bool, path: Path, finite: bool
-) -> Judged:
+) -> Evaluation:
     """Evaluate the champion at `path` on each ground; if `examine`, also certify it on the first.
 
     Runs in its own process. The arguments are small: the pool of Python 3.11 hangs if a process is

@@ -159,7 +159,7 @@ class Limbo(Hop):
         return dataclasses.replace(after, bar=deepest, raised=aim.raised, height=standards.height)
 
     @override
-    def judge(self, stats: Any, settings: object) -> dict[str, jax.Array]:
+    def evaluate(self, stats: Any, settings: object) -> dict[str, jax.Array]:
         deep = jnp.maximum(stats.bar - stats.raised, 0.0)
         bar = jnp.minimum(deep / (DEEP * self.creature.frame.hip_height), 1.0)
         return fitness_terms(self.creature, self.horizon, stats, {"bar": bar})

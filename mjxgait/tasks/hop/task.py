@@ -111,7 +111,7 @@ class Hop(PlainTask):
         return rested(after, self.horizon, standards.rest, touches(self.creature, sensed))
 
     @override
-    def judge(self, stats: EpisodeStats, settings: HopConfig) -> dict[str, jax.Array]:
+    def evaluate(self, stats: EpisodeStats, settings: HopConfig) -> dict[str, jax.Array]:
         return fitness_terms(self.creature, self.horizon, stats)
 
     def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
@@ -180,7 +180,7 @@ class Travel(Hop):
         reached = jnp.round(aim.goal / aim.spacing).astype(jnp.int32) - 1
         return dataclasses.replace(after, reached=reached)
 
-    def judge(self, stats: EpisodeStats, settings: object) -> dict[str, jax.Array]:
+    def evaluate(self, stats: EpisodeStats, settings: object) -> dict[str, jax.Array]:
         """See `Task`: style counts in proportion to the share of the way to the nominal goal."""
         way = self._way(stats) / NOMINAL_GOAL
         style = style_terms(self.creature, self.horizon, stats)

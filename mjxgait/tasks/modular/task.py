@@ -210,7 +210,7 @@ class Swim(GoingTask):
             lacking=lacking,
         )
 
-    def judge(self, stats: SwimStats, settings: SwimConfig) -> Mapping[str, jax.Array]:
+    def evaluate(self, stats: SwimStats, settings: SwimConfig) -> Mapping[str, jax.Array]:
         """See `Task`: the speed; its loss by overlap; the loss of the rest by foreign momentum."""
         speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
@@ -258,7 +258,7 @@ class Roam(GoingTask):
             upright=jnp.where(begins, 1.0, jnp.minimum(stats.upright, upright)),
         )
 
-    def judge(self, stats: RoamStats, settings: RoamConfig) -> Mapping[str, jax.Array]:
+    def evaluate(self, stats: RoamStats, settings: RoamConfig) -> Mapping[str, jax.Array]:
         """See `Task`: the speed; its loss by overlap; the loss of the rest by tipping over.
 
         Blocks overlap each other or the ground.
@@ -321,7 +321,7 @@ class Jump(BlocksTask):
             heights=jnp.where(now, jnp.maximum(stats.heights, low), stats.heights),
         )
 
-    def judge(self, stats: JumpStats, settings: JumpConfig) -> Mapping[str, jax.Array]:
+    def evaluate(self, stats: JumpStats, settings: JumpConfig) -> Mapping[str, jax.Array]:
         """See `Task`: m; its loss by overlap; the loss of the rest by an early end.
 
         Blocks overlap each other or the ground. An early end costs, because the wildest leap is the

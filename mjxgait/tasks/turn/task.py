@@ -81,7 +81,7 @@ class Turn(PlainTask):
         )
 
     @override
-    def judge(self, stats: TurnStats, settings: TurnSettings) -> Mapping[str, jax.Array]:
+    def evaluate(self, stats: TurnStats, settings: TurnSettings) -> Mapping[str, jax.Array]:
         seconds, frame = self.horizon * self.step, self.creature.frame
         rate = jnp.degrees(stats.turned) / seconds
         weight_lifted = frame.mass * 9.81 * frame.hip_height * seconds

@@ -90,7 +90,7 @@ class EpisodeStats(protocol.EpisodeStats):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Judge:
+class StatsRecorder:
     """Accumulator of the episode statistics of one creature.
 
     half_time: step. contact: m above the floor below which a foot is down.

@@ -26,7 +26,7 @@ from mjxgait.tasks.walk.fitness import (
 )
 from mjxgait.tasks.walk.stats import (
     EpisodeStats,
-    Judge,
+    StatsRecorder,
     TargetStats,
     along,
     target_stats,
@@ -90,8 +90,8 @@ class Walk(PlainTask):
         return terms["fall"] <= FALLEN
 
     @property
-    def _keeper(self) -> Judge:
-        return Judge(self.creature, self.step, self.horizon // 2, self.settings.contact)
+    def _recorder(self) -> StatsRecorder:
+        return StatsRecorder(self.creature, self.step, self.horizon // 2, self.settings.contact)
 
     def standards(self, settings: WalkConfig) -> jax.Array:
         """See `Task`: the wanted clearance [] of each swing in m."""
@@ -99,16 +99,16 @@ class Walk(PlainTask):
 
     @override
     def init(self) -> EpisodeStats:
-        return self._keeper.init()
+        return self._recorder.init()
 
     @override
     def update(
         self, stats: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
     ) -> EpisodeStats:
-        return self._keeper.update(stats, sensed, torque, standards)
+        return self._recorder.update(stats, sensed, torque, standards)
 
     @override
-    def judge(self, stats: Any, settings: WalkConfig) -> dict[str, jax.Array]:
+    def evaluate(self, stats: Any, settings: WalkConfig) -> dict[str, jax.Array]:
         return fitness_terms(self.creature, settings, self.step, self.horizon, stats)
 
     def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
@@ -188,12 +188,12 @@ class AskedWalk(Walk):
         standards: jax.Array,
         aim: Heading,
     ) -> TargetStats:
-        plain = self._keeper.update(stats, sensed, torque, standards)
+        plain = self._recorder.update(stats, sensed, torque, standards)
         after = wish_updated(self.creature, stats, plain, sensed)
         return along(stats, after, aim[0], self.horizon // 2) if aim else after
 
     @override
-    def judge(self, stats: TargetStats, settings: WalkConfig) -> dict[str, jax.Array]:
+    def evaluate(self, stats: TargetStats, settings: WalkConfig) -> dict[str, jax.Array]:
         return wished_terms(self.creature, settings, self.step, self.horizon, stats)
 
     @override
