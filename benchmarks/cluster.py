@@ -39,7 +39,7 @@ from mjxgait.creature import Creature
 from mjxgait.distributed.connect import connected
 from mjxgait.distributed.jobs import AdvanceRows, Job
 from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.rows import Blocks
+from mjxgait.distributed.rows import ChunkedEvaluator
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.plugins import resolve_config
 from mjxgait.simulation.evaluator import Evaluator
@@ -155,7 +155,7 @@ def blocks(scheduler: Scheduler, options: argparse.Namespace) -> dict[str, Any]:
     creature, config = subject(options, 512)
     experiment = build_experiment(creature, config)
     clock = Clock(scheduler)
-    step = experiment.compile(Blocks(cast(Scheduler, clock), creature, config))
+    step = experiment.compile(ChunkedEvaluator(cast(Scheduler, clock), creature, config))
     begun = experiment.place(experiment.init())
     for machine in (0, 1):
         with one_of(scheduler, machine):
@@ -182,7 +182,7 @@ def overhead(scheduler: Scheduler, options: argparse.Namespace) -> dict[str, Any
     found: dict[str, Any] = {"population": SIZES[-1]}
     for size in SIZES:
         creature, config = subject(options, SIZES[-1], seconds=0.05, block=size)
-        evaluation = Timed(Blocks(scheduler, creature, config))
+        evaluation = Timed(ChunkedEvaluator(scheduler, creature, config))
         experiment = build_experiment(creature, config)
         step = experiment.compile(evaluation)
         state = experiment.place(experiment.init())

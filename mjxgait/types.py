@@ -115,11 +115,11 @@ class RequestedTrials:
     known: Evaluation
 
 
-Workings = TypeVar("Workings")
+StepData = TypeVar("StepData")
 Parameters = TypeVar("Parameters")
 
 
-class Plant(Protocol[Workings]):
+class Plant(Protocol[StepData]):
     """Batched physics, one step split around the controller.
 
     Every array has one more axis than documented on the state: the lanes, at position `lane_axis`
@@ -136,18 +136,18 @@ class Plant(Protocol[Workings]):
         """Note to the user about the choice of this plant; empty if there is none."""
         ...
 
-    def forward(self, state: BodyState) -> tuple[Sensed, Workings]:
+    def forward(self, state: BodyState) -> tuple[Sensed, StepData]:
         """Compute the current state's position and velocity dependent terms.
 
-        Also return the plant's step data (`workings`) for the two calls below.
+        Also return the plant's step data (`step_data`) for the two calls below.
         """
         ...
 
-    def solve_damped(self, workings: Workings, damping: jax.Array, force: jax.Array) -> jax.Array:
+    def solve_damped(self, step_data: StepData, damping: jax.Array, force: jax.Array) -> jax.Array:
         """Return accelerations `(M + diag(damping))^-1 force`; both arguments `[nv]` per lane."""
         ...
 
-    def advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
+    def advance(self, state: BodyState, step_data: StepData, torque: jax.Array) -> BodyState:
         """Return the state one `sim_dt` later under applied generalised forces `torque` `[nv]`.
 
         Friction passes through.
@@ -162,7 +162,7 @@ class Plant(Protocol[Workings]):
         ...
 
 
-class ModelPlant(Plant[Workings], Protocol[Workings, Parameters]):
+class ModelPlant(Plant[StepData], Protocol[StepData, Parameters]):
     """Physics of one creature's model with replaceable parameters."""
 
     @property
@@ -188,14 +188,14 @@ class ModelPlant(Plant[Workings], Protocol[Workings, Parameters]):
         """Return the plant of another body: constants as from `parameters_of`, or traced arrays."""
         ...
 
-    def heavier(self, parameters: Parameters, factor: Number) -> Parameters:
+    def with_mass_scale(self, parameters: Parameters, factor: Number) -> Parameters:
         """Return one body's parameters with masses and inertias times factor, [] or [nbody - 1].
 
         Dependent numbers (the weights of constraints) are computed anew.
         """
         ...
 
-    def resized(self, parameters: Parameters, factor: Number) -> Parameters:
+    def with_length_scale(self, parameters: Parameters, factor: Number) -> Parameters:
         """Return one body's parameters with each part's lengths times factor [nbody - 1].
 
         Its mass is scaled by the third power and its inertia by the fifth (`creature.scale`).

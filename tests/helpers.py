@@ -34,8 +34,8 @@ from mjxgait.tasks.base import in_order
 from mjxgait.tasks.starts import Starts
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import signed_weights, terms_under
-from mjxgait.training.blueprint import Plan
 from mjxgait.training.experiment import Batch
+from mjxgait.training.spec import SimulatorSpec
 from mjxgait.types import Evaluation, RequestedTrials
 
 STOOL = Path(__file__).parent / "data" / "stool"
@@ -167,7 +167,7 @@ class Shares:
 
 
 def made_up_evaluate(
-    blueprint: Plan,
+    spec: SimulatorSpec,
     numbers: object,
     settings: Config,
     starts: Starts,
@@ -179,7 +179,7 @@ def made_up_evaluate(
     Key poses in the middle are the best, the higher the weight of speed the more; poses that are not
     numbers have no value.
     """
-    task, poses = blueprint.own.task, genomes.key_poses
+    task, poses = spec.own.task, genomes.key_poses
     shape = (*poses.shape[:2], starts.friction.shape[1])
     worth = -jnp.asarray(settings.fitness.speed)[:, None] * jnp.square(poses).sum((2, 3))
     worth = worth[..., None, None] * starts.friction[:, None, :, None]

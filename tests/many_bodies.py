@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.types import BodyState, Plant
 
 XML = """
@@ -89,12 +89,12 @@ def varied(xml: str, seed: int, most: float = 0.25) -> mujoco.MjModel:
     return spec.compile()
 
 
-def layout_of(model: mujoco.MjModel, watched: Sequence[str] = WATCHED) -> SenseLayout:
+def layout_of(model: mujoco.MjModel, watched: Sequence[str] = WATCHED) -> ObservationLayout:
     """All hinges are driven."""
     hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
     geoms = np.array([model.geom(name).id for name in watched])
     trunk = model.body("trunk").id
-    return SenseLayout(trunk, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], geoms)
+    return ObservationLayout(trunk, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], geoms)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,9 +143,9 @@ def everything(plant: Plant) -> Callable[..., Everything]:
     """From state, torque and damping to all that the plant's methods give."""
 
     def program(state: BodyState, torque: jax.Array, damping: jax.Array) -> Everything:
-        sensed, workings = plant.forward(state)
-        solved = plant.solve_damped(workings, damping, torque)
-        return sensed, solved, plant.advance(state, workings, torque)
+        sensed, step_data = plant.forward(state)
+        solved = plant.solve_damped(step_data, damping, torque)
+        return sensed, solved, plant.advance(state, step_data, torque)
 
     return program
 

@@ -28,7 +28,7 @@ from mjxgait.tasks.walk.stats import (
     StatsRecorder,
     TargetStats,
     target_stats,
-    wish_updated,
+    target_updated,
 )
 from mjxgait.types import Sensed
 
@@ -76,7 +76,7 @@ def evaluation(body: Creature, recordings: list[Frames]) -> tuple[TargetStats, j
     def episode(sensed: Sensed, torque: jax.Array) -> tuple[TargetStats, jax.Array]:
         def step(stats: TargetStats, now: tuple) -> tuple[TargetStats, jax.Array]:
             after = evaluate.update(stats, *now, clearance)
-            return wish_updated(body, stats, after, now[0]), why_fallen(body, ends, now[0])
+            return target_updated(body, stats, after, now[0]), why_fallen(body, ends, now[0])
 
         return jax.lax.scan(step, target_stats(evaluate.init(), 4), (sensed, torque))
 

@@ -128,10 +128,10 @@ def advance(
     return made(settings, problem).step_and_births(state)
 
 
-def begun(evolution: Toy, seed: int = 0, climbs: bool = False) -> EvolutionState:
-    """The first state; `climbs`: of a task whose trials may become harder, and have not yet."""
+def begun(evolution: Toy, seed: int = 0, has_curriculum: bool = False) -> EvolutionState:
+    """The first state; `has_curriculum`: of a task whose trials may become harder, and have not yet."""
     state: EvolutionState = begin(*inputs(evolution), key_of(seed))
-    if not climbs:
+    if not has_curriculum:
         return state
     return dataclasses.replace(state, level=jnp.int32(0), stale=jnp.zeros((), bool))
 
@@ -141,10 +141,10 @@ def run(
     generations: int = 30,
     seed: int = 0,
     program: Callable[..., Any] = advance,
-    climbs: bool = False,
+    has_curriculum: bool = False,
 ) -> list[tuple[EvolutionState, GenerationMetrics]]:
     given = inputs(evolution)
-    state, history = begun(evolution, seed, climbs), []
+    state, history = begun(evolution, seed, has_curriculum), []
     while len(history) < generations:
         state, metrics, _ = jax.device_get(program(*given, state))
         if state.generation >= 0:
@@ -233,7 +233,7 @@ def test_an_elite_that_remembers_is_worth_the_mean_of_its_rounds():
 def test_all_are_judged_again_once_trials_have_become_harder(stale: bool):
     """Then nobody lives on by an old verdict, and else nobody is judged twice."""
     climbing = toy(forced=NEVER, growth=3.0)
-    (before, _), settings = run(climbing, 4, climbs=True)[-1], inputs(climbing)[0]
+    (before, _), settings = run(climbing, 4, has_curriculum=True)[-1], inputs(climbing)[0]
     before = dataclasses.replace(before, level=jnp.int32(1), stale=jnp.asarray(stale))
     after, _, births = jax.device_get(advance(settings, Problem(slope=2.0), before))
     again = (births.key_poses[:20] == before.genomes.key_poses).all((1, 2))
@@ -252,7 +252,7 @@ SPARING = {"growth": 3.0, "forced": NEVER, "family": 0.25, "rivals": 4}
 def test_no_family_takes_more_than_its_share():
     """Mother by mother from one of the first generation; and the best are still the best."""
     history = run(toy(**SPARING), 25)
-    plain = run(toy(growth=3.0, forced=NEVER), 25, climbs=True)
+    plain = run(toy(growth=3.0, forced=NEVER), 25, has_curriculum=True)
     for (before, _), (after, told) in itertools.pairwise(history):
         mothers = np.asarray(told.mothers)
         assert (after.family == before.family[mothers]).all()
@@ -305,11 +305,11 @@ def test_no_verdict_of_an_earlier_judge_counts():
     """Parents fill the places for which there are no children; nobody has judged them now."""
     keeping = toy(survival="children", elite=0.15, forced=NEVER, growth=1.5)
     (before, _), settings = run(keeping, 4)[-1], inputs(keeping)[0]
-    harder = jax.device_get(advance(settings, Problem(slope=2.0), before))[0]
-    evaluation = np.isfinite(harder.fitness)
+    at_level = jax.device_get(advance(settings, Problem(slope=2.0), before))[0]
+    evaluation = np.isfinite(at_level.fitness)
     assert evaluation.tolist() == [True] * 10 + [False] * 10
-    expected = 2 * near_zero(harder.genomes)[:10]
-    np.testing.assert_allclose(harder.fitness[:10], expected, rtol=1e-6)
+    expected = 2 * near_zero(at_level.genomes)[:10]
+    np.testing.assert_allclose(at_level.fitness[:10], expected, rtol=1e-6)
 
 
 def test_the_population_is_sorted_and_without_duplicates():
@@ -322,8 +322,8 @@ def test_the_population_is_sorted_and_without_duplicates():
 def test_of_a_verdict_only_one_survives_if_that_makes_a_duplicate():
     """Genomes of which much does nothing are copies of each other that no look at them finds."""
     crowd = {"growth": 3.0, "forced": NEVER}
-    plain, _ = run(toy(SILENT, **crowd), 12, climbs=True)[-1]
-    state, told = run(toy(SILENT, **crowd, same="verdict"), 12, climbs=True)[-1]
+    plain, _ = run(toy(SILENT, **crowd), 12, has_curriculum=True)[-1]
+    state, told = run(toy(SILENT, **crowd, same="verdict"), 12, has_curriculum=True)[-1]
     assert int(told.unique) == 20
     assert len(np.unique(plain.fitness)) < 10
     assert len(np.unique(state.fitness)) == 20
@@ -332,7 +332,7 @@ def test_of_a_verdict_only_one_survives_if_that_makes_a_duplicate():
 def test_of_a_verdict_the_youngest_survives():
     """So what does nothing drifts, and may do something one day."""
     drifting = toy(SILENT, forced=NEVER, growth=3.0, same="verdict")
-    before = run(drifting, 4, climbs=True)[-1][0]
+    before = run(drifting, 4, has_curriculum=True)[-1][0]
     after, _, births = jax.device_get(advance(*inputs(drifting), before))
     born = SILENT.value(births)
     known = np.isin(after.fitness, before.fitness) & np.isin(after.fitness, born)
@@ -356,7 +356,7 @@ def test_the_same_verdict_is_that_of_one_round():
 def test_by_verdict_too_nobody_lives_on_by_an_old_one(stale: bool):
     """Trials have become harder, and too few come to different verdicts to fill the population."""
     climbing = toy(SILENT, forced=NEVER, growth=3.0, same="verdict")
-    (before, _), settings = run(climbing, 4, climbs=True)[-1], inputs(climbing)[0]
+    (before, _), settings = run(climbing, 4, has_curriculum=True)[-1], inputs(climbing)[0]
     before = dataclasses.replace(before, level=jnp.int32(1), stale=jnp.asarray(stale))
     after, _, _ = jax.device_get(advance(settings, Problem(slope=2.0, silent=True), before))
     old = after.born < after.generation
@@ -397,7 +397,7 @@ def test_duplicates_fill_the_population_when_they_may_stay():
 def test_everybody_of_the_initial_population_is_judged_before_generation_zero(growth: float):
     evolution = toy(growth=growth)
     created = begun(evolution)
-    first = run(evolution, 1, climbs=growth == 3.0)[0][0]
+    first = run(evolution, 1, has_curriculum=growth == 3.0)[0][0]
     assert int(first.generation) == 0
     assert np.allclose(first.fitness, np.sort(near_zero(created.genomes))[::-1])
     assert (first.origin == Origin.INITIAL).all()
@@ -406,8 +406,8 @@ def test_everybody_of_the_initial_population_is_judged_before_generation_zero(gr
 @pytest.mark.parametrize("growth", [1.2, 2.0, 3.0])
 def test_the_first_generation_is_the_best_of_as_many_candidates_as_asked_for(growth: float):
     plain, choosy = toy(growth=growth), toy(growth=growth, initial_choice=4)
-    climbs = growth == 3.0
-    rounds, first = [], begun(choosy, climbs=climbs)
+    has_curriculum = growth == 3.0
+    rounds, first = [], begun(choosy, has_curriculum=has_curriculum)
     while int(first.generation) < 0:
         first, _, evaluation = advance(*inputs(choosy), first)
         rounds.append(near_zero(evaluation))
@@ -415,7 +415,9 @@ def test_the_first_generation_is_the_best_of_as_many_candidates_as_asked_for(gro
     assert len(set(candidates.tolist())) == 80
     np.testing.assert_allclose(first.fitness, candidates[:20], rtol=1e-6)
     np.testing.assert_allclose(near_zero(first.genomes), first.fitness, rtol=1e-6)
-    assert np.median(first.fitness) > np.median(run(plain, 1, climbs=climbs)[0][0].fitness)
+    assert np.median(first.fitness) > np.median(
+        run(plain, 1, has_curriculum=has_curriculum)[0][0].fitness
+    )
 
 
 def test_an_individual_that_cannot_be_judged_loses_and_poisons_nobody():

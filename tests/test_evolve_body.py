@@ -19,13 +19,13 @@ from mjxgait.creature.overlap import find_crossings
 from mjxgait.creature.proportions import grown, proportions
 from mjxgait.evolution.chance import key_of
 from mjxgait.inspect import facts, read_snapshot
-from mjxgait.physics.derived import sense_layout
+from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.tasks.starts import draw_starts
-from mjxgait.training.blueprint import SizeGrowth
 from mjxgait.training.folder import BODY, CHAMPION
+from mjxgait.training.spec import SizeGrowth
 
 MOST = 1.3
 
@@ -98,12 +98,12 @@ def test_so_it_is_on_the_stool(stool: Creature, make: Any):
 def compare_with_the_scaled_files(shipped: Creature, make: Any) -> None:
     """Every number that the plant reads, from places to the weights of constraints."""
     known, sizes = proportions(shipped), some_sizes(shipped, 3)
-    layout, touch = sense_layout(shipped), shipped.settings.termination.touch
+    layout, touch = observation_layout(shipped), shipped.settings.termination.touch
     plant = make(shipped.model_where(touch), layout, None)
     factors = np.exp(np.append(sizes, 0.0))[known.size_of]
-    ours = jax.jit(plant.resized)(plant.parameters, jnp.float32(factors))
+    ours = jax.jit(plant.with_length_scale)(plant.parameters, jnp.float32(factors))
     other = grown(shipped, known.by_part(sizes))
-    theirs = plant.parameters_of(other.model_where(touch), sense_layout(other), None)
+    theirs = plant.parameters_of(other.model_where(touch), observation_layout(other), None)
     for (path, a), b in zip(
         jax.tree_util.tree_leaves_with_path(ours), jax.tree.leaves(theirs), strict=True
     ):
@@ -118,7 +118,7 @@ def compare_with_the_scaled_files(shipped: Creature, make: Any) -> None:
 @pytest.mark.parametrize("shipped", ["crab", "luxo"], indirect=True)
 def test_it_stands_as_high_above_the_floor(shipped: Creature):
     known, sizes = proportions(shipped), some_sizes(shipped, 4)
-    plant = fast_plant(shipped.model, sense_layout(shipped), None)
+    plant = fast_plant(shipped.model, observation_layout(shipped), None)
     config = mjxgait.config.schema.RolloutConfig(starts=1)
     start = jax.tree.map(lambda x: x[0], draw_starts(key_of(0), shipped, config))
     # Compiled for the place alone, for the body's other numbers take the compiler ten seconds.
@@ -134,9 +134,9 @@ def test_it_stands_as_high_above_the_floor(shipped: Creature):
 
 def test_bars_that_are_watched_grow_with_their_parts(stool: Creature):
     """Alike factors scale every depth alike."""
-    plant = fast_plant(stool.evolution_model, sense_layout(stool), find_crossings(stool))
+    plant = fast_plant(stool.evolution_model, observation_layout(stool), find_crossings(stool))
     assert plant.topology.first
-    grew = jax.jit(plant.resized)(plant.parameters, jnp.full(stool.model.nbody - 1, 1.2))
+    grew = jax.jit(plant.with_length_scale)(plant.parameters, jnp.full(stool.model.nbody - 1, 1.2))
     for name in ("centre", "half", "radius", "reach"):
         before, after = getattr(plant.parameters.bars, name), getattr(grew.bars, name)
         np.testing.assert_allclose(after, 1.2 * before, rtol=1e-5, err_msg=name)

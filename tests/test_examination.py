@@ -362,12 +362,12 @@ def test_on_the_way_those_are_looked_at_that_do_best_in_the_tryout(experiment, l
     settings = {"candidates": 4, "difference": 0.0, "on_the_way": 2}
     looks.rehearsals = [-0.1]
     same = dataclasses.replace(
-        examiner(experiment, exams, **settings), tryout=Shares(0.8, 0.92, 0.85, 0.95)
+        examiner(experiment, exams, **settings), prescreen=Shares(0.8, 0.92, 0.85, 0.95)
     )
     assert same.early(all_alike) is None
     assert looks.asked == [*LOOK * 2]
     looks.asked.clear()
-    one = dataclasses.replace(same, tryout=Shares(0.8, 0.92, 0.85, 0.85), _margins={})
+    one = dataclasses.replace(same, prescreen=Shares(0.8, 0.92, 0.85, 0.85), _margins={})
     assert one.early(all_alike) is None
     assert looks.asked == LOOK
     looks.rehearsals = [0.3]
@@ -379,13 +379,13 @@ def test_in_the_end_who_fails_the_tryout_is_looked_at_only_if_all_do(experiment,
     settings = {"candidates": 3, "difference": 0.0}
     looks.rehearsals = [0.1]
     some = dataclasses.replace(
-        examiner(experiment, exams, **settings), tryout=Shares(0.5, 0.95, 0.92)
+        examiner(experiment, exams, **settings), prescreen=Shares(0.5, 0.95, 0.92)
     )
     assert some.best(ranked(experiment)).champion.fitness == 4.0
     assert looks.asked == [*LOOK * 2, "exam"]
     looks.asked.clear()
     none = dataclasses.replace(
-        examiner(experiment, exams, **settings), tryout=Shares(0.5, 0.6, 0.7)
+        examiner(experiment, exams, **settings), prescreen=Shares(0.5, 0.6, 0.7)
     )
     assert none.best(ranked(experiment)).champion.fitness == 3.0
     assert looks.asked == [*LOOK, "exam"]
@@ -500,18 +500,18 @@ def test_hardly_anything_evolves_beside_an_examination(
     tmp_path: Path, experiment: Experiment, promising: None, monkeypatch: pytest.MonkeyPatch
 ):
     """It takes all cores; only the generation that has begun is ended."""
-    folder, latest, soon = tmp_path / "run", [], examination.certify
+    folder, lru, soon = tmp_path / "run", [], examination.certify
 
     def slow(*arguments: object, **settings: object) -> Certificate:
         for _ in range(2):
-            latest.append(read_metrics(folder / "metrics.jsonl")[-1]["generation"])
+            lru.append(read_metrics(folder / "metrics.jsonl")[-1]["generation"])
             time.sleep(0.5)
         return soon(*arguments, **settings)
 
     monkeypatch.setattr(examination, "certify", slow)
     create_run(folder, experiment.creature, experiment.config)
     assert "in generation 3" in trained(folder, experiment)
-    assert latest[1] - latest[0] <= 1
+    assert lru[1] - lru[0] <= 1
 
 
 def test_what_goes_wrong_in_a_look_ends_the_run_as_it_would_have(

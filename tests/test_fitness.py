@@ -163,7 +163,7 @@ def test_a_task_counts_what_its_settings_say(body: Creature):
     """The terms by their weights, and a foot as down from the height that they say."""
     for contact, whip, down in ((0.002, 0.0, 1.0), (0.0, 4.0, 0.0)):
         settings = WalkConfig(contact=contact, weights=Weights(foot_speed=whip))
-        task = Walk.told(body, STEP, HORIZON, body.settings.termination, settings)
+        task = Walk.with_settings(body, STEP, HORIZON, body.settings.termination, settings)
         assert ("foot_speed" in task.terms) == bool(whip)
         touching = jnp.full(len(body.feet.watched), 0.001)
         stats = task.update(
@@ -194,9 +194,11 @@ def test_ramps_rise_and_are_whole_from_their_last_step_on(steps: int):
     """Compiled for any length: what is cut to whole numbers must become all of it."""
     now = np.arange(20)
     grown = np.asarray(jax.jit(jax.vmap(ramped, (None, 0)))(jnp.int32(steps), jnp.asarray(now)))
-    harder = np.asarray(jax.jit(jax.vmap(hardness, (None, 0)))(jnp.int32(steps), jnp.asarray(now)))
+    at_level = np.asarray(
+        jax.jit(jax.vmap(hardness, (None, 0)))(jnp.int32(steps), jnp.asarray(now))
+    )
     rising = now < steps
     np.testing.assert_allclose(grown[rising], now[rising] / max(steps, 1), atol=1e-6)
-    np.testing.assert_allclose(harder[rising], (now[rising] + 1) / (steps + 1), rtol=1e-6)
+    np.testing.assert_allclose(at_level[rising], (now[rising] + 1) / (steps + 1), rtol=1e-6)
     assert (grown[~rising] == 1).all()
-    assert (harder[~rising] == 1).all()
+    assert (at_level[~rising] == 1).all()

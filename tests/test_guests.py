@@ -83,7 +83,7 @@ def test_guests_are_seated_among_what_a_program_proposes(
     monkeypatch.setattr(generation, "with_guests", noted)
     for sources in ([], [[1], [0, 2], [1]]):
         batch = build_batch(stool, small_configs, sources=sources)
-        proposed = partial(generation.propose, batch.experiments[0].blueprint, None)
+        proposed = partial(generation.propose, batch.experiments[0].spec, None)
         jax.eval_shape(proposed, batch.rows, batch.abstract())
     assert seated == [((3, 2), (3, 6))]
 

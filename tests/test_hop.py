@@ -262,8 +262,8 @@ def test_every_term_has_a_case_that_is_not_zero():
 def tallied(task: Hop, moments: list[Sensed], torques: list[list[float]]) -> EpisodeStats:
     stats = task.init()
     for sensed, torque in zip(moments, torques, strict=True):
-        standards = task.standards(task.settings)
-        stats = task.update(stats, sensed, jnp.array(torque), standards, jnp.float32(1.0))
+        params = task.params(task.settings)
+        stats = task.update(stats, sensed, jnp.array(torque), params, jnp.float32(1.0))
     return jax.device_get(stats)
 
 

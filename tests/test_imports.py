@@ -49,7 +49,7 @@ FLOORS = (
     ("config", "controllers/*/config", "tasks/*/*config", "tasks/walk/gaits"),
     ("creature/ground", "animation/clips"),
     ("types", "processes", "kinds"),
-    ("files", "latest"),
+    ("files", "lru"),
     ("errors",),
 )
 """Patterns of modules and packages, from the top down: each may import from the floors below it, and

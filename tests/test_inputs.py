@@ -11,10 +11,10 @@ from helpers import STOOL, program_text, small_config
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.overlap import find_crossings
-from mjxgait.physics.derived import sense_layout
+from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
-from mjxgait.training.blueprint import Numbers
 from mjxgait.training.experiment import Batch, build_experiment
+from mjxgait.training.spec import BodyParams
 from mjxgait.types import BodyState
 
 INPUTS = {"body": "inputs", "physics": "auto"}
@@ -79,7 +79,7 @@ def test_a_shape_more_needs_no_program_of_its_own(stools: str, stool: Creature, 
 
 def test_room_that_nothing_is_in_changes_nothing(tmp_path: Path):
     creature = saddled(shutil.copytree(STOOL, tmp_path / "other"))
-    known = (creature.evolution_model, sense_layout(creature), find_crossings(creature))
+    known = (creature.evolution_model, observation_layout(creature), find_crossings(creature))
     tight, roomy = fast_plant(*known), fast_plant(*known, roomy=True)
     rng, lanes = np.random.default_rng(0), 8
     qpos = np.tile(creature.stand_qpos[:, None], lanes)
@@ -116,12 +116,12 @@ def test_the_motion_is_that_of_the_bodys_own_program(stool: Creature, tmp_path: 
     genomes, rows = own.init().genomes, jax.tree.map(lambda leaf: leaf[None], own.row)
 
     @jax.jit
-    def with_numbers(numbers: Numbers) -> jax.Array:
-        simulator = given.blueprint.simulator(numbers)
+    def with_numbers(numbers: BodyParams) -> jax.Array:
+        simulator = given.spec.simulator(numbers)
         alone = jax.tree.map(lambda leaf: leaf[None], genomes)
         return simulator.simulate(alone, rows.starts, rows.settings).stats.forward[0]
 
-    found = with_numbers(its.blueprint.numbers)
+    found = with_numbers(its.spec.numbers)
     expected = jax.jit(own.simulate)(genomes).stats.forward
     np.testing.assert_allclose(found, expected, atol=1e-4)
-    assert np.abs(found - with_numbers(given.blueprint.numbers)).max() > 1e-3
+    assert np.abs(found - with_numbers(given.spec.numbers)).max() > 1e-3

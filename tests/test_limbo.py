@@ -30,13 +30,13 @@ from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.starts import nominal_starts, perturbed_starts
 from mjxgait.tasks.hop import config as evolution
 from mjxgait.tasks.hop.config import BAR_PLACE, LimboConfig, LimboWeights
-from mjxgait.tasks.hop.limbo import Aim, Limbo, bar_distance, intrusion
+from mjxgait.tasks.hop.limbo import Goal, Limbo, bar_distance, intrusion
 from mjxgait.tasks.hop.stats import signed_weights, terms_under
 from mjxgait.tasks.hop.thresholds import LimboConfig as Demanded
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.generation import (
     LEADERS,
-    Row,
+    RunParams,
     climbed,
     next_starts,
 )
@@ -164,10 +164,10 @@ def test_the_bar_is_sensed(luxo: Creature):
 def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creature):
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     moments = [sensed(luxo, posed(luxo, ahead)) for ahead in (0.0, 0.5, 1.4)]
-    stats, standards = task.init(), task.standards(LimboConfig(height=HEIGHT))
-    aim = Aim(goal=jnp.float32(1.4), raised=jnp.float32(0.03))
+    stats, params = task.init(), task.params(LimboConfig(height=HEIGHT))
+    goal = Goal(ahead=jnp.float32(1.4), raised=jnp.float32(0.03))
     for moment in moments:
-        stats = task.update(stats, moment, jnp.zeros(3), standards, aim)
+        stats = task.update(stats, moment, jnp.zeros(3), params, goal)
     assert float(stats.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
     # The bar that it would have stayed beneath, and none lower than its own.
     needed = float(task.outcome(stats)["bar"])
@@ -212,7 +212,7 @@ def test_the_bar_comes_down_in_so_many_steps_and_stays(stool: Creature):
 
     assert state.level == 0
 
-    def raised(row: Row, level: int) -> np.ndarray:
+    def raised(row: RunParams, level: int) -> np.ndarray:
         return np.asarray(next_starts(task, row, at(state, level=level)).raised)
 
     for level, expected in ((0, 0.1), (1, 0.09), (5, 0.05), (10, 0.0), (50, 0.0)):
@@ -225,7 +225,7 @@ def at(state: EvolutionState, **changed: float) -> EvolutionState:
 
 
 @pytest.mark.parametrize(
-    ("missed", "bar", "of", "climbs"),
+    ("missed", "bar", "of", "has_curriculum"),
     [
         ([0.9, 0.2], [0.0, 0.08], LEADERS, True),
         ([0.9, 0.5], [0.0, 0.0], LEADERS, False),
@@ -235,7 +235,7 @@ def at(state: EvolutionState, **changed: float) -> EvolutionState:
     ],
 )
 def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
-    stool: Creature, missed: list[float], bar: list[float], of: int, climbs: bool
+    stool: Creature, missed: list[float], bar: list[float], of: int, has_curriculum: bool
 ):
     """Means over the two trials; and what they were worth under the higher bar is forgotten."""
     task = Limbo(stool, STEP, HORIZON, stool.settings.termination)
@@ -249,11 +249,11 @@ def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
     state = at(state, quiet=6, barren=2, spell_best=3.0)
     settings = LimboConfig(lowering=5)
     after = climbed(task, settings, state)
-    assert int(after.level) == 4 + climbs
-    assert bool(after.stale) == climbs
-    assert (np.asarray(after.rounds) == (0.0 if climbs else 3.0)).all()
+    assert int(after.level) == 4 + has_curriculum
+    assert bool(after.stale) == has_curriculum
+    assert (np.asarray(after.rounds) == (0.0 if has_curriculum else 3.0)).all()
     spells = (int(after.quiet), int(after.barren), float(after.spell_best))
-    assert spells == ((-1, 0, -np.inf) if climbs else (6, 2, 3.0))
+    assert spells == ((-1, 0, -np.inf) if has_curriculum else (6, 2, 3.0))
     nobody = (at(state, generation=-1), at(state, fitness=np.full(len(terms), -np.inf)))
     assert all(int(climbed(task, settings, unjudged).level) == 4 for unjudged in nobody)
     assert climbed(task, settings, dataclasses.replace(state, level=None)).level is None

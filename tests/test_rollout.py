@@ -241,8 +241,8 @@ def test_the_dead_are_not_judged_on(experiment: Experiment):
     stats = dataclasses.replace(simulator.task.init(), steps=jnp.int32(7), forward=jnp.float32(0.3))
     start = jax.tree.map(lambda leaf: leaf[0], starts)
     lane = SimpleNamespace(
-        aim=simulator.task.aim(start),
-        standards=simulator.task.standards(experiment.row.settings.fitness),
+        goal=simulator.task.goal(start),
+        params=simulator.task.params(experiment.row.settings.fitness),
     )
     sensed = standing(experiment, trunk_vel=fast)
     torque = jnp.ones(len(creature.joints.names))
@@ -431,8 +431,8 @@ def test_mjx_agrees_with_c_mujoco(folder: Path):
     torque = np.zeros((1, model.nv), np.float32)
 
     def advance(state, torque):
-        sensed, workings = plant.forward(state)
-        return plant.advance(state, workings, torque), sensed
+        sensed, step_data = plant.forward(state)
+        return plant.advance(state, step_data, torque), sensed
 
     step = jax.jit(advance)
     rng = np.random.default_rng(0)

@@ -119,8 +119,8 @@ def torques(request: pytest.FixtureRequest, stool: Creature) -> dict[str, np.nda
     state = BodyState(*arrays, jnp.ones(len(cases)))
 
     def torque(state: BodyState, rules: Rules, target: jax.Array) -> jax.Array:
-        sensed, workings = simulator.plant.forward(state)
-        return simulator.drive.torque(simulator.plant, rules, state, sensed, workings, target)
+        sensed, step_data = simulator.plant.forward(state)
+        return simulator.drive.torque(simulator.plant, rules, state, sensed, step_data, target)
 
     target = jnp.moveaxis(jnp.tile(jnp.float32(TARGET), (len(cases), 1)), 0, lanes)
     program = jax.jit(torque).lower(state, rules(cases), target).compile(compiler_options=SLIM)
@@ -177,10 +177,10 @@ def test_stands_where_plain_pd_blows_up(stiff: Creature):
     law, target = rules(lanes), jnp.tile(jnp.float32(stiff.joints.stand)[:, None], 2)
 
     def step(state: BodyState) -> tuple[BodyState, jax.Array]:
-        sensed, workings = simulator.plant.forward(state)
-        torque = simulator.drive.torque(simulator.plant, law, state, sensed, workings, target)
+        sensed, step_data = simulator.plant.forward(state)
+        torque = simulator.drive.torque(simulator.plant, law, state, sensed, step_data, target)
         force = jnp.zeros((stiff.model.nv, 2)).at[stiff.joints.dof_adr].set(torque)
-        return simulator.plant.advance(state, workings, force), sensed.joint_vel
+        return simulator.plant.advance(state, step_data, force), sensed.joint_vel
 
     still = jnp.zeros((stiff.model.nv, 2))
     qpos = jnp.tile(jnp.float32(stiff.stand_qpos)[:, None], 2)

@@ -97,11 +97,11 @@ def test_pushes_go_all_ways_along_the_ground_in_the_middle_of_the_episode(stool:
 
 def test_each_part_has_a_mass_of_its_own_but_in_the_first_start(stool: Creature):
     starts = drawn(stool, masses=0.2)
-    assert differing(starts, drawn(stool)) == {"heaviness"}
-    assert starts.heaviness.shape == (COUNT, stool.model.nbody - 1)
-    assert np.all(starts.heaviness[0] == 1.0)
-    assert 1.18 < starts.heaviness[1:].max() <= 1.2
-    assert 0.8 <= starts.heaviness[1:].min() < 0.82
+    assert differing(starts, drawn(stool)) == {"mass_scale"}
+    assert starts.mass_scale.shape == (COUNT, stool.model.nbody - 1)
+    assert np.all(starts.mass_scale[0] == 1.0)
+    assert 1.18 < starts.mass_scale[1:].max() <= 1.2
+    assert 0.8 <= starts.mass_scale[1:].min() < 0.82
 
 
 def test_torques_are_up_to_so_many_steps_late_but_in_the_first_start(stool: Creature):
@@ -121,7 +121,7 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(weighed: Experiment):
     """All that follows from the masses is reckoned too: `Plant.heavier`, whose own tests compare C."""
     simulator, starts, settings = weighed.simulator, weighed.starts, weighed.row.settings
     plain = simulator.plant.parameters
-    masses = jax.jit(simulator.plant.heavier)(plain, starts.heaviness[1])
+    masses = jax.jit(simulator.plant.with_mass_scale)(plain, starts.mass_scale[1])
 
     given = weighed.init().genomes, starts, settings
     genomes, *rows = jax.tree.map(lambda leaf: leaf[None], given)
@@ -161,9 +161,9 @@ def test_each_generation_has_other_starts_until_all_have_had_their_turn(stool: C
     state = experiment.init()
 
     def told(generation: int) -> list[float]:
-        latest = dataclasses.replace(state, generation=generation - 1)
+        lru = dataclasses.replace(state, generation=generation - 1)
         return np.asarray(
-            next_starts(experiment.simulator.task, experiment.row, latest).friction
+            next_starts(experiment.simulator.task, experiment.row, lru).friction
         ).tolist()
 
     rounds = [told(generation) for generation in range(5)]
@@ -210,6 +210,6 @@ def test_disturbances_grow_in_so_many_steps_to_their_full_size(stool: Creature):
 @pytest.mark.parametrize(("fallen", "ready"), [(0.0, True), (0.2, True), (0.4, False)])
 def test_who_hardly_falls_is_ready_for_harder_trials(stool: Creature, fallen: float, ready: bool):
     task = build_experiment(stool, small_config(fitness={"hardening": 3})).simulator.task
-    assert task.climbs
+    assert task.has_curriculum
     assert task.levels(task.settings) == 3
-    assert bool(task.mastered({"fall": jnp.float32(fallen)})) == ready
+    assert bool(task.level_passed({"fall": jnp.float32(fallen)})) == ready

@@ -26,7 +26,7 @@ from mjxgait.tasks.hop.config import (
     NOMINAL_GOAL,
     TravelConfig,
 )
-from mjxgait.tasks.hop.task import Aim, Travel
+from mjxgait.tasks.hop.task import Goal, Travel
 from mjxgait.tasks.hop.thresholds import TravelConfig as Demanded
 from mjxgait.training.experiment import build_experiment
 
@@ -37,8 +37,8 @@ def task(creature: Creature) -> Travel:
     return Travel(creature, STEP, HORIZON, creature.settings.termination)
 
 
-def aim(goal: float, spacing: float) -> Aim:
-    return Aim(jnp.float32(goal), jnp.float32(spacing))
+def goal_at(ahead: float, spacing: float) -> Goal:
+    return Goal(jnp.float32(ahead), jnp.float32(spacing))
 
 
 @pytest.mark.parametrize(
@@ -48,8 +48,8 @@ def test_a_goal_that_is_near_or_passed_moves_on_by_a_stride(
     stool: Creature, forward: float, goal: float
 ):
     """Of half a metre, so near is 2.5 cm from it."""
-    moved = task(stool).onward(aim(1.0, 0.5), moment(stool, forward + 0.02))
-    assert float(moved.goal) == pytest.approx(goal)
+    moved = task(stool).next_goal(goal_at(1.0, 0.5), moment(stool, forward + 0.02))
+    assert float(moved.ahead) == pytest.approx(goal)
     assert float(moved.spacing) == 0.5
 
 
@@ -57,9 +57,9 @@ def test_evolution_and_examiner_move_goals_alike(stool: Creature):
     rng = np.random.default_rng(0)
     first = rng.uniform(*GOALS, 200)
     goal, way = first * rng.integers(1, 4, 200), rng.uniform(-1, 6, 200)
-    theirs = DEMANDS.onward(goal, first, way)
+    theirs = DEMANDS.next_goal(goal, first, way)
     ours = [
-        float(task(stool).onward(aim(g, f), moment(stool, w)).goal)
+        float(task(stool).next_goal(goal_at(g, f), moment(stool, w)).ahead)
         for g, f, w in zip(goal, first, way, strict=True)
     ]
     np.testing.assert_allclose(ours, theirs, atol=1e-5)
@@ -69,17 +69,17 @@ def test_evolution_and_examiner_move_goals_alike(stool: Creature):
 def test_the_goal_of_other_tasks_stays(stool: Creature):
     goal, way = np.array([1.0, 0.4]), np.array([1.0, 3.0])
     for name in ("walk", "hop", "limbo"):
-        assert acceptance_of(name).onward(goal, goal, way) is goal
+        assert acceptance_of(name).next_goal(goal, goal, way) is goal
 
 
 def test_what_counts_is_the_way_and_what_is_told_are_the_goals(stool: Creature):
-    travel, goal = task(stool), aim(0.5, 0.5)
-    stats, standards = travel.init(), travel.standards(TravelConfig())
+    travel, goal = task(stool), goal_at(0.5, 0.5)
+    stats, params = travel.init(), travel.params(TravelConfig())
     assert float(travel.outcome(stats)["way"]) == 0
     for forward in (0.0, 0.3, 0.49, 0.8, 1.01, 1.1):
         sensed = moment(stool, forward)
-        stats = travel.update(stats, sensed, jnp.zeros(4), standards, goal)
-        goal = travel.onward(goal, sensed)
+        stats = travel.update(stats, sensed, jnp.zeros(4), params, goal)
+        goal = travel.next_goal(goal, sensed)
     told = travel.outcome(stats)
     assert (float(told["goals"]), float(told["way"])) == (2.0, pytest.approx(1.1, abs=1e-6))
     terms = travel.evaluate(stats, TravelConfig())

@@ -26,7 +26,7 @@ from mjxgait.evolution.chance import key_of
 from mjxgait.plugins import resolve_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.tasks.base import in_order, score
-from mjxgait.tasks.walk.config import WalkConfig, Weights, WishWeights
+from mjxgait.tasks.walk.config import TargetWeights, WalkConfig, Weights
 from mjxgait.tasks.walk.fitness import REWARDS, TERMS, terms_under
 from mjxgait.tasks.walk.gaits import (
     GAITS,
@@ -37,13 +37,13 @@ from mjxgait.tasks.walk.gaits import (
 )
 from mjxgait.tasks.walk.stats import EpisodeStats, Footfalls, gait_missed, no_footfalls, stepped
 from mjxgait.tasks.walk.targets import (
-    Wishes,
+    WalkTargets,
     configured,
     hint,
     speed_of,
-    wished,
+    with_targets,
 )
-from mjxgait.tasks.walk.task import AskedWalk, Walk
+from mjxgait.tasks.walk.task import TargetedWalk, Walk
 from mjxgait.training.experiment import build_batch
 
 STEP, HORIZON = 0.005, 1000
@@ -70,9 +70,9 @@ def body(stool: Creature) -> Creature:
     )
 
 
-def asked(config: WalkConfig, body: Creature) -> AskedWalk:
-    task = Walk.told(body, STEP, HORIZON, body.settings.termination, config)
-    assert isinstance(task, AskedWalk)
+def asked(config: WalkConfig, body: Creature) -> TargetedWalk:
+    task = Walk.with_settings(body, STEP, HORIZON, body.settings.termination, config)
+    assert isinstance(task, TargetedWalk)
     return task
 
 
@@ -112,18 +112,18 @@ everything = st.fixed_dictionaries(dict.fromkeys(MISSES, amount))
 @given(
     weights=st.fixed_dictionaries({n: amount for n in TERMS if n not in ("distance", *WHIP)}),
     worth=st.floats(0.0078125, 128.0, width=32),
-    wishes=st.fixed_dictionaries({f.name: amount for f in dataclasses.fields(WishWeights)}),
+    targets=st.fixed_dictionaries({f.name: amount for f in dataclasses.fields(TargetWeights)}),
     spoilt=everything,
     way=st.floats(0.0625, 40.0, width=32),
     steps=st.integers(40, HORIZON),
     left=st.floats(-5.0, 5.0, width=32, allow_subnormal=False),
 )
 def test_a_walk_however_bad_beats_none_at_any_weights(
-    fitness_of, weights, worth, wishes, spoilt, way, steps, left
+    fitness_of, weights, worth, targets, spoilt, way, steps, left
 ):
     own = Weights(**(weights | WHIP | {"distance": worth}))
     base = config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0)
-    wish = dataclasses.replace(base.wish, weights=WishWeights(**wishes))
+    wish = dataclasses.replace(base.wish, weights=TargetWeights(**targets))
     config = traced_fitness(dataclasses.replace(base, weights=own, wish=wish))
     bad = walking(way, steps=steps, reason=1, left=left) | spoilt
     # Beyond rounding: a hundredth of what it earned is left to it at least.
@@ -136,9 +136,9 @@ def test_a_walk_however_bad_beats_none_at_any_weights(
 def free_of_cost(weights: Weights) -> WalkConfig:
     """The same rewards, and nothing that costs."""
     nothing = dict.fromkeys((n for n in TERMS if n not in REWARDS), 0.0)
-    free = dict.fromkeys((field.name for field in dataclasses.fields(WishWeights)), 0.0)
+    free = dict.fromkeys((field.name for field in dataclasses.fields(TargetWeights)), 0.0)
     base = config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0)
-    wish = dataclasses.replace(base.wish, weights=WishWeights(**free))
+    wish = dataclasses.replace(base.wish, weights=TargetWeights(**free))
     return dataclasses.replace(base, weights=dataclasses.replace(weights, **nothing), wish=wish)
 
 
@@ -185,7 +185,7 @@ def test_posture_is_held_from_both_sides(body: Creature, fitness_of):
 
 def test_without_a_wish_nothing_is_looked_at(body: Creature):
     free = small_config().fitness
-    task = Walk.told(body, STEP, HORIZON, body.settings.termination, free)
+    task = Walk.with_settings(body, STEP, HORIZON, body.settings.termination, free)
     assert type(task) is Walk
     assert task.terms == terms_under(free.weights)
     assert type(task.init()) is EpisodeStats
@@ -316,10 +316,10 @@ def test_who_turns_is_told_a_heading_that_turns(body: Creature):
     """And its way is what it goes along that heading."""
     task = asked(config_of(turn=30.0), body)
     starts = task.trials(key_of(0), body, small_config().rollout)
-    aim = task.aim(jax.tree.map(lambda leaf: leaf[0], starts))
+    goal = task.goal(jax.tree.map(lambda leaf: leaf[0], starts))
     for _ in range(200):
-        aim = task.onward(aim, None)
-    assert float(aim[0]) == pytest.approx(np.radians(30.0), rel=1e-4)
+        goal = task.next_goal(goal, None)
+    assert float(goal[0]) == pytest.approx(np.radians(30.0), rel=1e-4)
 
 
 def test_who_is_steered_goes_straight_once_and_to_both_sides(body: Creature):
@@ -373,19 +373,19 @@ def test_what_is_no_speed_is_refused(body: Creature, text: str):
 
 
 def test_wishes_are_names_for_settings(body: Creature):
-    config = wished(Config(), body, Wishes(speed="0.25", gait="trot", turn=20.0))
+    config = with_targets(Config(), body, WalkTargets(speed="0.25", gait="trot", turn=20.0))
     assert config.fitness.wish.table == {"speed": 0.25, "gait": "trot", "turn": 20.0}
     assert config.controller.interpolation > Config().controller.interpolation
     assert config.controller.mirror
     assert config.controller.steering > Config().controller.steering
-    assert not wished(Config(), body, Wishes(gait="bound")).controller.mirror
-    assert wished(Config(), body, Wishes()) is not None
-    assert wished(Config(), body, Wishes()) == Config()
+    assert not with_targets(Config(), body, WalkTargets(gait="bound")).controller.mirror
+    assert with_targets(Config(), body, WalkTargets()) is not None
+    assert with_targets(Config(), body, WalkTargets()) == Config()
 
 
 def test_natural_is_the_gait_of_an_animal_at_this_speed(body: Creature):
-    def asked(**wishes) -> Config:
-        return wished(Config(), body, Wishes(gait="natural", **wishes))
+    def asked(**targets) -> Config:
+        return with_targets(Config(), body, WalkTargets(gait="natural", **targets))
 
     for speed, gait in (("fr0.1", "walk"), ("fr0.45", "walk"), ("fr0.6", "trot")):
         wish = asked(speed=speed).fitness.wish
@@ -394,13 +394,13 @@ def test_natural_is_the_gait_of_an_animal_at_this_speed(body: Creature):
     assert asked().fitness.wish.speed is None
     two, eight = (altered(body, feet={"names": tuple(map(str, range(n)))}) for n in (1, 8))
     for other in (two, eight):
-        config = wished(Config(), other, Wishes(gait="natural"))
+        config = with_targets(Config(), other, WalkTargets(gait="natural"))
         assert config.fitness.wish.gait == "auto"
         assert config.controller == Config().controller
 
 
 def usually(creature: Creature, file: Path | None = None, **asked) -> Config:
-    return configured(creature, file, {}, Wishes(**asked))
+    return configured(creature, file, {}, WalkTargets(**asked))
 
 
 def natural_dog() -> Creature:
@@ -443,7 +443,7 @@ def test_a_usual_gait_that_it_does_not_have_is_named(stool: Creature):
 
 def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):
     slow, fast = (
-        wished(Config(), body, Wishes(gait="natural", speed=speed)).controller
+        with_targets(Config(), body, WalkTargets(gait="natural", speed=speed)).controller
         for speed in ("0.2", "1.0")
     )
     assert slow.advance == fast.advance == "clock"
@@ -452,10 +452,10 @@ def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):
     for config, speed in ((slow, 0.2), (fast, 1.0)):
         low, high = config.tuning.period
         assert low < animal_stride(speed, hip) / speed < high
-    assert wished(Config(), body, Wishes(speed="0.2")).controller.around == slow.around
+    assert with_targets(Config(), body, WalkTargets(speed="0.2")).controller.around == slow.around
     # A controller without poses has nothing to begin near.
     other = dataclasses.replace(Config(), use=UseConfig("program", "walk"))
-    natural = wished(other, body, Wishes(gait="natural"))
+    natural = with_targets(other, body, WalkTargets(gait="natural"))
     assert natural.controller == other.controller
     assert natural.evolution == other.evolution
 
@@ -464,29 +464,29 @@ def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):
 def test_a_requested_gait_or_speed_keeps_the_order_of_the_poses(body: Creature, wish: dict):
     default = resolve_config({}, "x")
     assert (default.evolution.crossing, default.evolution.mutation) == ("mixed", "mixed")
-    found = wished(default, body, Wishes(**wish)).evolution
+    found = with_targets(default, body, WalkTargets(**wish)).evolution
     assert (found.crossing, found.mutation) == ("align", "gaussian")
     assert not found.forced.enabled
-    assert wished(default, body, Wishes(turn=20.0)).evolution == default.evolution
+    assert with_targets(default, body, WalkTargets(turn=20.0)).evolution == default.evolution
 
 
 def test_a_gait_by_name_begins_with_its_own_footfalls(body: Creature):
     def drawn(name: str) -> tuple[float, ...]:
-        return wished(Config(), body, Wishes(gait=name)).controller.around
+        return with_targets(Config(), body, WalkTargets(gait=name)).controller.around
 
     cycles = {name: drawn(name) for name in ("walk", "amble", "trot", "pace")}
     assert len(set(cycles.values())) == 4
     assert () not in cycles.values()
     # Of those whose halves do not mirror each other none is drawn.
     assert [drawn(name) for name in ("canter", "bound", "gallop")] == [()] * 3
-    assert wished(Config(), body, Wishes(turn=20.0)).controller.around == ()
+    assert with_targets(Config(), body, WalkTargets(turn=20.0)).controller.around == ()
 
 
 @pytest.mark.parametrize("name", ["walk", "amble", "trot", "pace"])
 def test_a_drawn_gait_is_what_its_name_says(dog_sizes, name: str):
     """By the examiner, from which feet stand in each pose of the cycle."""
     body = load_creature(data_folder("envs") / "short_quadruped")
-    config = wished(Config(), body, Wishes(gait=name)).controller
+    config = with_targets(Config(), body, WalkTargets(gait=name)).controller
     half = np.array(config.around).reshape(config.key_poses, -1)
     cycle = np.concatenate([half, body.mirror.image(half)])
     fine = np.array(
@@ -525,12 +525,12 @@ def test_who_sets_a_low_limit_instead_of_a_wish_is_told(body: Creature):
 
 def test_every_style_is_a_table_of_settings(body: Creature):
     for name in ("calm", "sneaky", "heavy", "proud", "tired", "hurried"):
-        assert wished(Config(), body, Wishes(style=name)) != Config()
+        assert with_targets(Config(), body, WalkTargets(style=name)) != Config()
 
 
 def test_to_walk_anywhere_is_learnt_on_all_that_it_is_asked_for(body: Creature):
-    assert wished(Config(), body, Wishes(certificate="walks")) == Config()
-    config = wished(Config(), body, Wishes(certificate="anywhere"))
+    assert with_targets(Config(), body, WalkTargets(certificate="walks")) == Config()
+    config = with_targets(Config(), body, WalkTargets(certificate="anywhere"))
     asked, rollout = StressConfig(), config.rollout
     assert config.examination.level == "anywhere"
     assert rollout.slope >= asked.slope
@@ -542,25 +542,25 @@ def test_to_walk_anywhere_is_learnt_on_all_that_it_is_asked_for(body: Creature):
 
 
 @pytest.mark.parametrize(
-    ("wishes", "says"),
+    ("targets", "says"),
     [
-        (Wishes(certificate="anywere"), 'did you mean "anywhere"'),
-        (Wishes(gait="tripod"), "a body with 4 feet has no tripod"),
-        (Wishes(gait="tort"), "no tort"),
-        (Wishes(style="calmm"), 'did you mean "calm"'),
-        (Wishes(style="none.toml"), "no such file"),
+        (WalkTargets(certificate="anywere"), 'did you mean "anywhere"'),
+        (WalkTargets(gait="tripod"), "a body with 4 feet has no tripod"),
+        (WalkTargets(gait="tort"), "no tort"),
+        (WalkTargets(style="calmm"), 'did you mean "calm"'),
+        (WalkTargets(style="none.toml"), "no such file"),
     ],
 )
-def test_what_means_nothing_is_refused(body: Creature, wishes: Wishes, says: str):
+def test_what_means_nothing_is_refused(body: Creature, targets: WalkTargets, says: str):
     with pytest.raises(UserError, match=says):
-        wished(Config(), body, wishes)
+        with_targets(Config(), body, targets)
 
 
 def test_a_style_file_with_an_unknown_key_is_named(body: Creature, tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("[fitness]\nclearence = 0.2\n")
     with pytest.raises(UserError, match=r"mine\.toml.*clearence"):
-        wished(Config(), body, Wishes(style=str(file)))
+        with_targets(Config(), body, WalkTargets(style=str(file)))
 
 
 def test_a_champion_remembers_what_was_asked(stool: Creature, tmp_path):

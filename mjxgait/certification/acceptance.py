@@ -45,7 +45,7 @@ class AcceptanceCriteria(Protocol):
         """Return the criteria with those of the requested targets, by name."""
         ...
 
-    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+    def commanded_heading(self, steps: int, time_step: float) -> np.ndarray | None:
         """Commanded heading [T] in rad at each control step; None if none."""
         ...
 
@@ -56,7 +56,7 @@ class AcceptanceCriteria(Protocol):
         ...
 
     def obeyed(
-        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+        self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """Evaluate how these headings [S, T] were followed."""
         ...
@@ -86,7 +86,7 @@ class AcceptanceCriteria(Protocol):
         """
         ...
 
-    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         """Return the next goals, m ahead of the start.
 
         goal: current ones. first: those at the start. way: m of the trunk ahead of the start.
@@ -147,7 +147,7 @@ class Unasked:
         """See `AcceptanceCriteria`: the same."""
         return self
 
-    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+    def commanded_heading(self, steps: int, time_step: float) -> np.ndarray | None:
         """See `AcceptanceCriteria`: straight ahead."""
         return None
 
@@ -158,7 +158,7 @@ class Unasked:
         return None
 
     def obeyed(
-        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+        self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """See `AcceptanceCriteria`: nothing was commanded."""
         return ()
@@ -191,7 +191,7 @@ class StaysUp(Unasked):
         """See `AcceptanceCriteria`: as they are."""
         return starts
 
-    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         """See `AcceptanceCriteria`: the same."""
         return goal
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from mjxgait.creature.bars import Bar, bars_of
 from mjxgait.creature.creature import Creature
-from mjxgait.latest import Latest
+from mjxgait.lru import LruCache
 
 NEAR = 0.1
 """Hip heights; joints nearer to each other count as one place, like the three of an Euler hip."""
@@ -29,9 +29,9 @@ CLOSE = 0.05
 MOST_PAIRS = 256
 """Largest number of measured pairs of bars."""
 
-Numbers = Any
+BodyParams = Any
 """np.ndarray | jax.Array"""
-Vector = tuple[Numbers, Numbers, Numbers]
+Vector = tuple[BodyParams, BodyParams, BodyParams]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -68,8 +68,8 @@ class Crossings:
 
 
 def bar_distance(
-    apart: Vector, first: Vector, second: Vector, lengths: tuple[Numbers, Numbers]
-) -> Numbers:
+    apart: Vector, first: Vector, second: Vector, lengths: tuple[BodyParams, BodyParams]
+) -> BodyParams:
     """Distance of two segments in m, elementwise, of NumPy or JAX arrays.
 
     Ericson 2005, "Real-Time Collision Detection", section 5.1.9.
@@ -99,7 +99,7 @@ def find_crossings(creature: Creature) -> Crossings:
     return _FOUND.find(_search_key(creature), lambda: _search(creature))
 
 
-_FOUND: Latest[Crossings] = Latest(32)
+_FOUND: LruCache[Crossings] = LruCache(32)
 
 
 def _search_key(creature: Creature) -> bytes:
@@ -286,5 +286,5 @@ def _parts(rows: np.ndarray) -> Vector:
     return rows[0], rows[1], rows[2]
 
 
-def _dot(a: Sequence[Numbers], b: Sequence[Numbers]) -> Numbers:
+def _dot(a: Sequence[BodyParams], b: Sequence[BodyParams]) -> BodyParams:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -35,7 +35,7 @@ from mjxgait.training.folder import (
     truncate_metrics,
 )
 from mjxgait.training.loop import conclude, interruptible, report, versions
-from mjxgait.training.prescreen import tryout_of
+from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import disk_errors
 
@@ -159,7 +159,7 @@ def train(
         screen.say(experiment.plant_note)
     islands = _Islands(folder, creature, config, resume)
     examiner = Examiner(
-        experiment, versions(), screen.say, Exams(folder / EXAMS), tryout_of(experiment)
+        experiment, versions(), screen.say, Exams(folder / EXAMS), prescreen_of(experiment)
     )
     began, reason, examined = time.perf_counter(), None, None
     screen.say(

@@ -63,7 +63,7 @@ class AdvanceRows(Job[Advanced]):
     @override
     def do(self, programs: Programs, recipe: Recipe) -> Advanced:
         batch = programs.batch(recipe)
-        way = _Way(programs.step(recipe), batch, self._begun(batch), self.until)
+        way = _Generations(programs.step(recipe), batch, self._begun(batch), self.until)
         champions: dict[int, Champion] = {}
         for _ in way:
             for row, experiment in enumerate(batch.experiments):
@@ -93,7 +93,7 @@ class AdvanceIsland(Job[Advanced]):
         begun = self.state and self.state.state(one.abstract(), "an island's state")
         state, reason = begun or one.init(self.island), None
         alone = jax.tree.map(lambda leaf: leaf[None], state)
-        way = _Way(programs.step(recipe), batch, alone, self.until)
+        way = _Generations(programs.step(recipe), batch, alone, self.until)
         for lines in way:
             state = jax.tree.map(lambda leaf: leaf[0], way.states)
             lines[0] |= followed(one.simulator.controller.numbers(state.genomes))
@@ -119,7 +119,7 @@ class Evaluate(Job[Evaluation]):
         return evaluation
 
 
-class _Way:
+class _Generations:
     """Successive generations of one job and their metrics.
 
     states: of the latest generation.

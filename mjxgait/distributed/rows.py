@@ -141,7 +141,7 @@ def _joined(pieces: Sequence[Advanced]) -> Advanced:
     )
 
 
-class Blocks:
+class ChunkedEvaluator:
     """Chunked `Evaluator`: a scheduler evaluates a run's genomes in chunks of equal size.
 
     The size fixes a chunk's bits: they do not depend on the number of machines.
@@ -151,7 +151,7 @@ class Blocks:
     """
 
     def __init__(self, scheduler: Scheduler, creature: Creature, config: Config) -> None:
-        self._crew, self._recipe = scheduler, Recipe.of(creature, [config])
+        self._scheduler, self._recipe = scheduler, Recipe.of(creature, [config])
         self.size = block_size(config.evolution.offspring, config.rollout.block)
 
     def evaluate(
@@ -163,7 +163,7 @@ class Blocks:
     ) -> Evaluation:
         """See `Evaluator`. Takes one row; its settings are in the recipe."""
         genomes, trials, asked = jax.device_get((genomes, trials, asked))
-        return together(self._crew.all(self._work(genomes, trials, asked)) or ())
+        return together(self._scheduler.all(self._work(genomes, trials, asked)) or ())
 
     def _work(
         self, genomes: object, trials: Starts, asked: RequestedTrials | None

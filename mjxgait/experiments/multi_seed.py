@@ -97,12 +97,12 @@ def create_zoo(
     together: see `Seeds`.
 
     Raises:
-      UserError: see `check_zoo` and `check_plan`; or the folder cannot be written.
+      UserError: see `check_zoo` and `check_spec`; or the folder cannot be written.
     """
-    from mjxgait.training.blueprint import check_plan  # JAX takes a second to import
+    from mjxgait.training.spec import check_spec  # JAX takes a second to import
 
     zoo = check_zoo(zoo, creature, config, runs)
-    check_plan(creature, config)
+    check_spec(creature, config)
     seeds = Seeds(tuple(range(config.seed, config.seed + runs)), together)
     for seed, folder in zip(seeds.seeds, seeds.folders(zoo), strict=True):
         create_run(folder, creature, to_the_last(dataclasses.replace(config, seed=seed)))

@@ -126,6 +126,7 @@ def load(kind: str, text: str) -> str:
         raise UserError(f"{path}: {name} must inherit from {base.__module__}.{base.__name__}")
     if missing := sorted(getattr(cls, "__abstractmethods__", ())):
         raise UserError(f"{path}: {name} lacks {', '.join(missing)}")
+    _refuse_old_names(path, cls)
     every = getattr(cls, "every", 1)
     try:
         holds(every)
@@ -168,6 +169,28 @@ def _base(kind: str) -> type:
     from mjxgait.tasks.plain import PlainTask
 
     return RealController if kind == "controller" else PlainTask
+
+
+RENAMED = {
+    "aim": "goal",
+    "climbs": "has_curriculum",
+    "harder": "at_level",
+    "judge": "evaluate",
+    "mastered": "level_passed",
+    "onward": "next_goal",
+    "senses": "observations",
+    "standards": "params",
+    "told": "with_settings",
+}
+"""Old and new names of the members of a task or a controller."""
+
+
+def _refuse_old_names(path: Path, cls: type) -> None:
+    """Refuse a class with a member under its old name, which nothing would call."""
+    own = [one for one in cls.__mro__ if not one.__module__.startswith("mjxgait.")]
+    for old, new in RENAMED.items():
+        if any(old in vars(one) for one in own):
+            raise UserError(f"{path}: {cls.__name__}.{old} is now called {new}; rename it")
 
 
 def _module(path: Path, kind: str) -> ModuleType:

@@ -114,6 +114,6 @@ class HaltingReference(PoseReference):
         halted = planned + share * (self.creature.joints.stand - planned)
         target = self.corrected(halted, senses, memory["steps"])
         steps = memory["steps"] + 1
-        onward = self.advance(memory["position"], target, senses["joint_pos"], steps)
-        position = np.where(since < 0, onward, memory["position"])
+        next_goal = self.advance(memory["position"], target, senses["joint_pos"], steps)
+        position = np.where(since < 0, next_goal, memory["position"])
         return target, {**memory, "position": position, "steps": steps}

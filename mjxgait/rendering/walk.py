@@ -138,9 +138,9 @@ class Walk:
 
     def _goals(self, first: np.ndarray) -> np.ndarray:
         """All goals [goals] of the walk, m ahead of the start."""
-        goals, onward = list(first[first > 0]), how_simulated(self.champion.task).onward
+        goals, next_goal = list(first[first > 0]), how_simulated(self.champion.task).next_goal
         farthest = ((self.trunk_pos[:, :2] - self.trunk_pos[0, :2]) @ self.forward).max()
-        while len(goals) and (after := onward(goals[-1], goals[0], farthest)) > goals[-1]:
+        while len(goals) and (after := next_goal(goals[-1], goals[0], farthest)) > goals[-1]:
             goals.append(after)
         return np.array(goals)
 

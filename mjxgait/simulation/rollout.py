@@ -70,8 +70,8 @@ class Lane:
     plan: object
     memory: object
     stats: EpisodeStats
-    aim: object
-    standards: object
+    goal: object
+    params: object
     rules: Rules
     push: jax.Array
     push_step: jax.Array
@@ -251,8 +251,8 @@ class Simulator:
             plan=jax.tree.map(lambda leaf: leaf[row, individual], plans),
             memory=self.controller.init(),
             stats=self.task.init(),
-            aim=self.task.aim(start),
-            standards=self.task.standards(mine.fitness),
+            goal=self.task.goal(start),
+            params=self.task.params(mine.fitness),
             rules=self.drive.rules(mine.drive, start.stiffness, start.damping),
             push=start.push,
             push_step=start.push_step,
@@ -273,18 +273,18 @@ class Simulator:
         k: [] steps since lanes took their latest episodes, the same for all lanes.
         """
         body = self._per_lane(_push)(lane)
-        sensed, workings = self.plant.forward(body)
+        sensed, step_data = self.plant.forward(body)
         command, memory = self._command(k, lane, sensed)
-        torque = self.drive.torque(self.plant, lane.rules, body, sensed, workings, command)
+        torque = self.drive.torque(self.plant, lane.rules, body, sensed, step_data, command)
         late = lane.late
         if late is not None:
             torque, late = self._per_lane(_arriving)(late, lane.stats.steps, torque)
         stats = self._per_lane(self._evaluate)(lane, sensed, torque)
-        body = self.plant.advance(body, workings, self._per_lane(self.drive.lift)(torque))
-        aim = self._per_lane(self.task.onward)(lane.aim, sensed)
+        body = self.plant.advance(body, step_data, self._per_lane(self.drive.lift)(torque))
+        goal = self._per_lane(self.task.next_goal)(lane.goal, sensed)
         kept = command if self._holds else None
         return dataclasses.replace(
-            lane, body=body, memory=memory, stats=stats, aim=aim, command=kept, late=late
+            lane, body=body, memory=memory, stats=stats, goal=goal, command=kept, late=late
         )
 
     def _command(self, k: jax.Array, lane: Lane, sensed: Sensed) -> tuple[jax.Array, object]:
@@ -302,7 +302,7 @@ class Simulator:
         """Return the controller's command [J] and its memory."""
         time, names = lane.stats.steps * self.drive.step, self.controller.reads
         senses = sense(self.creature, sensed, time, names)
-        senses |= self.task.senses(lane.aim, sensed)
+        senses |= self.task.observations(lane.goal, sensed)
         return self.controller.act(lane.plan, lane.memory, senses)
 
     def _look_for_overlap(self, lane: Lane) -> Lane:
@@ -313,17 +313,17 @@ class Simulator:
         deeper = jnp.where(going & (depth > stats.overlap), depth, stats.overlap)
         return dataclasses.replace(lane, stats=dataclasses.replace(stats, overlap=deeper))
 
-    def reason(self, sensed: Sensed, aim: object) -> jax.Array:
+    def reason(self, sensed: Sensed, goal: object) -> jax.Array:
         """Return why [] an episode ends now; `FINISHED` while it goes on."""
-        ended = self.task.ended(sensed, aim)
+        ended = self.task.ended(sensed, goal)
         return jnp.where(_finite(sensed), ended, NONFINITE).astype(jnp.int32)
 
     def _evaluate(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
         """Update the statistics after a step, unless the episode has ended."""
         stats = lane.stats
         going = (stats.reason == FINISHED) & (stats.steps < self.steps)
-        reason = self.reason(sensed, lane.aim)
-        updated = self.task.update(stats, sensed, torque, lane.standards, lane.aim)
+        reason = self.reason(sensed, lane.goal)
+        updated = self.task.update(stats, sensed, torque, lane.params, lane.goal)
         kept = dataclasses.replace(stats, reason=jnp.where(going, reason, stats.reason))
         return _choose(going & (reason == FINISHED), updated, kept)
 

@@ -45,7 +45,7 @@ class PlainTask(abc.ABC):
         return draw_starts(key, creature, settings)
 
     @property
-    def climbs(self) -> bool:
+    def has_curriculum(self) -> bool:
         """See `Task`."""
         return False
 
@@ -53,42 +53,40 @@ class PlainTask(abc.ABC):
         """See `Task`."""
         return 0
 
-    def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
+    def at_level(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
         """See `Task`: always the same."""
         return trials
 
-    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+    def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """See `Task`."""
         return jnp.zeros((), bool)
 
-    def aim(self, trial: Starts) -> object:
+    def goal(self, trial: Starts) -> object:
         """See `Task`."""
         return ()
 
-    def standards(self, settings: Any) -> Any:
+    def params(self, settings: Any) -> Any:
         """See `Task`."""
         return settings
 
-    def senses(self, aim: Any, sensed: Sensed) -> Mapping[str, jax.Array]:
+    def observations(self, goal: Any, sensed: Sensed) -> Mapping[str, jax.Array]:
         """See `Task`."""
         return {}
 
-    def onward(self, aim: Any, sensed: Sensed) -> Any:
+    def next_goal(self, goal: Any, sensed: Sensed) -> Any:
         """See `Task`: the same."""
-        return aim
+        return goal
 
     def init(self) -> EpisodeStats:
         """See `Task`."""
         none = jnp.zeros((), jnp.int32)
         return EpisodeStats(steps=none, reason=none, overlap=jnp.zeros(()))
 
-    def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
+    def ended(self, sensed: Sensed, goal: Any) -> jax.Array:
         """See `Task`: a fall ends the episode."""
         return why_fallen(self.creature, self.ends, sensed)
 
-    def update(
-        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
-    ) -> Any:
+    def update(self, stats: Any, sensed: Sensed, torque: jax.Array, params: Any, goal: Any) -> Any:
         """See `Task`: one more step."""
         return dataclasses.replace(stats, steps=stats.steps + 1)
 

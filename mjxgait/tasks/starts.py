@@ -48,7 +48,7 @@ class Starts:
     stiffness: jax.Array
     damping: jax.Array
     ground: Ground | None = None
-    heaviness: jax.Array | None = None
+    mass_scale: jax.Array | None = None
     numbers: object = None
     goal: jax.Array | None = None
     raised: jax.Array | None = None
@@ -99,7 +99,7 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),
         stiffness=factors(key_stiffness),
         damping=factors(key_damping),
-        heaviness=_heaviness(jax.random.fold_in(key, 3), creature, config),
+        mass_scale=_mass_scale(jax.random.fold_in(key, 3), creature, config),
         ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
         delay=_delay(jax.random.fold_in(key, 6), config),
     )
@@ -133,7 +133,7 @@ def _delay(key: jax.Array, config: RolloutConfig) -> jax.Array | None:
     return jax.random.randint(key, (config.starts,), 0, config.latency + 1).at[0].set(0)
 
 
-def _heaviness(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:
+def _mass_scale(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:
     if not config.masses:
         return None
     parts = creature.model.nbody - 1

@@ -25,7 +25,7 @@ from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.base import Task, in_order, score
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.blueprint import Numbers, Plan
+from mjxgait.training.spec import BodyParams, SimulatorSpec
 from mjxgait.types import Evaluation, RequestedTrials, pytree
 
 LEADERS = 16
@@ -35,7 +35,7 @@ SENT = 4
 
 
 @pytree
-class Row:
+class RunParams:
     """Inputs that differ between runs of one compiled program: traced settings and all starts.
 
     sources: [S] rows whose best are evaluated among its children; its own number means no row.
@@ -60,24 +60,24 @@ def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
 
 
 def first_state(
-    blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
+    spec: SimulatorSpec, numbers: BodyParams | None, settings: Config, key: jax.Array
 ) -> EvolutionState:
     """Return the state of a run before the first evaluation."""
-    simulator = blueprint.simulator(numbers)
+    simulator = spec.simulator(numbers)
     task, trials = simulator.task, settings.rollout.starts
     state = evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
-    if not task.climbs:
+    if not task.has_curriculum:
         return state
     return dataclasses.replace(state, level=jnp.int32(0), stale=jnp.zeros((), bool))
 
 
 def propose(
-    blueprint: Plan, numbers: Numbers | None, rows: Row, states: EvolutionState
+    spec: SimulatorSpec, numbers: BodyParams | None, rows: RunParams, states: EvolutionState
 ) -> tuple[Proposal, Starts]:
     """Return the proposals of the rows [B], and the starts [B, R] to evaluate them on."""
-    simulator = blueprint.simulator(numbers)
+    simulator = spec.simulator(numbers)
 
-    def of_row(pair: tuple[Row, EvolutionState]) -> Proposal:
+    def of_row(pair: tuple[RunParams, EvolutionState]) -> Proposal:
         row, state = pair
         return evolution_of(simulator, row.settings).propose(state)
 
@@ -114,15 +114,15 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
 
 
 def evaluate(
-    blueprint: Plan,
-    numbers: Numbers | None,
+    spec: SimulatorSpec,
+    numbers: BodyParams | None,
     settings: Config,
     starts: Starts,
     genomes: object,
     asked: RequestedTrials | None = None,
 ) -> Evaluation:
     """Evaluate genomes [B, N, ...] on this machine."""
-    return Local(blueprint.simulator(numbers)).evaluate(genomes, starts, settings, asked)
+    return Local(spec.simulator(numbers)).evaluate(genomes, starts, settings, asked)
 
 
 def first_trials(states: EvolutionState, proposals: Proposal) -> RequestedTrials:
@@ -139,17 +139,17 @@ def first_trials(states: EvolutionState, proposals: Proposal) -> RequestedTrials
 
 
 def promote(
-    blueprint: Plan,
-    numbers: Numbers | None,
-    rows: Row,
+    spec: SimulatorSpec,
+    numbers: BodyParams | None,
+    rows: RunParams,
     states: EvolutionState,
     proposals: Proposal,
     evaluation: Evaluation,
 ) -> RequestedTrials:
     """Request the other trials of the best in the first, and of individuals evaluated again."""
-    simulator = blueprint.simulator(numbers)
+    simulator = spec.simulator(numbers)
 
-    def of_row(given: tuple[Row, EvolutionState, Proposal, Evaluation]) -> jax.Array:
+    def of_row(given: tuple[RunParams, EvolutionState, Proposal, Evaluation]) -> jax.Array:
         row, state, proposal, evaluation = given
         share = row.settings.rollout.promote
         return evolution_of(simulator, row.settings).promising(state, proposal, evaluation, share)
@@ -160,18 +160,18 @@ def promote(
 
 
 def absorb(
-    blueprint: Plan,
-    numbers: Numbers | None,
-    rows: Row,
+    spec: SimulatorSpec,
+    numbers: BodyParams | None,
+    rows: RunParams,
     states: EvolutionState,
     proposals: Proposal,
     evaluation: Evaluation,
 ) -> tuple[EvolutionState, GenerationMetrics]:
     """Complete the generation of the rows after the evaluation."""
-    simulator = blueprint.simulator(numbers)
+    simulator = spec.simulator(numbers)
 
     def of_row(
-        given: tuple[Row, EvolutionState, Proposal, Evaluation],
+        given: tuple[RunParams, EvolutionState, Proposal, Evaluation],
     ) -> tuple[EvolutionState, GenerationMetrics]:
         row, state, proposal, evaluation = given
         after, told = evolution_of(simulator, row.settings).absorb(state, proposal, evaluation)
@@ -191,24 +191,24 @@ def climbed(task: Task, settings: object, state: EvolutionState) -> EvolutionSta
         return state
     best = dict(zip(task.terms, jnp.mean(state.terms[:LEADERS], axis=1).T, strict=True))
     known = (state.generation >= 0) & jnp.isfinite(state.fitness[:LEADERS])
-    ready = jnp.mean(jax.vmap(task.mastered)(best) & known) > 0.5
+    ready = jnp.mean(jax.vmap(task.level_passed)(best) & known) > 0.5
     higher = ready & (state.level < task.levels(settings))
     rounds = None if state.rounds is None else jnp.where(higher, 0.0, state.rounds)
     after = begun_anew(state, higher)
     return dataclasses.replace(after, level=state.level + higher, stale=higher, rounds=rounds)
 
 
-def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:
+def next_starts(task: Task, row: RunParams, state: EvolutionState) -> Starts:
     """Return the starts [R] of the next generation, at its curriculum level."""
     starts = row.starts
     if row.settings.rollout.variety > 1:
         starts = _of_round(row, jnp.maximum(state.generation + 1, 0))
     if state.level is None:
         return starts
-    return task.harder(starts, row.settings.fitness, state.level)
+    return task.at_level(starts, row.settings.fitness, state.level)
 
 
-def _of_round(row: Row, generation: jax.Array) -> Starts:
+def _of_round(row: RunParams, generation: jax.Array) -> Starts:
     """Return the nominal start, and the next of the others in turn."""
     others = row.settings.rollout.starts - 1
     turn = 1 + (generation * others + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)

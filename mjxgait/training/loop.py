@@ -22,7 +22,7 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.files import write_text
-from mjxgait.latest import Latest
+from mjxgait.lru import LruCache
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.tasks.base import Task
 from mjxgait.training.checkpoint import Checkpoints
@@ -42,7 +42,7 @@ from mjxgait.training.folder import (
     read_metrics,
     truncate_metrics,
 )
-from mjxgait.training.prescreen import tryout_of
+from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.stages import CompiledGeneration
 from mjxgait.training.stored import disk_errors
@@ -83,12 +83,12 @@ def train(
         truncate_metrics(folder / METRICS, begun)
     if experiment.plant_note:
         screen.say(experiment.plant_note)
-    if tryout := tryout_of(experiment):
-        tryout.begin()
+    if prescreen := prescreen_of(experiment):
+        prescreen.begin()
     with screen.compiling(creature.name, experiment):
         step, state = _compiled(experiment, evaluator, restored)
     began = time.perf_counter()
-    examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS), tryout)
+    examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS), prescreen)
     try:
         with interruptible() as interrupted:
             state, reason, examined = _evolve(
@@ -129,7 +129,7 @@ def _compiled(
         return _step(experiment, evaluator), first.result()
 
 
-_COMPILED: Latest[CompiledGeneration] = Latest(2)
+_COMPILED: LruCache[CompiledGeneration] = LruCache(2)
 """Programs of this process's runs, so that the next seed in a notebook is not traced again."""
 
 

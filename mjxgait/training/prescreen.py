@@ -31,7 +31,7 @@ def tried_settings(config: Config) -> Config:
     exam = CertificateConfig()
     rollout = dataclasses.replace(
         config.rollout,
-        starts=1 + config.examination.tryout,
+        starts=1 + config.examination.prescreen,
         seconds=exam.seconds,
         variety=1,
         joint_noise=exam.starts.joints,
@@ -43,7 +43,7 @@ def tried_settings(config: Config) -> Config:
     return dataclasses.replace(config, seed=config.seed + OTHER, rollout=rollout)
 
 
-class Tryout:
+class Prescreen:
     """Pre-screening of one run; its program is compiled at first use or in advance by `begin`."""
 
     def __init__(self, experiment: Experiment) -> None:
@@ -98,8 +98,8 @@ class Tryout:
         """Starts [1, R] of all candidates of the run, at the highest curriculum level."""
         row, task = self._trials.row, self._trials.simulator.task
         starts = row.starts
-        if task.climbs:
-            starts = task.harder(starts, row.settings.fitness, jnp.int32(HARDEST))
+        if task.has_curriculum:
+            starts = task.at_level(starts, row.settings.fitness, jnp.int32(HARDEST))
         return jax.tree.map(lambda leaf: leaf[None], starts)
 
     @cached_property
@@ -116,7 +116,7 @@ class Tryout:
         return compiled(self._batch.lower_evaluate(genomes, self._starts))
 
 
-def tryout_of(experiment: Experiment) -> Tryout | None:
+def prescreen_of(experiment: Experiment) -> Prescreen | None:
     """Return the pre-screening of a run; None if its settings disable it."""
     settings = experiment.config.examination
-    return Tryout(experiment) if settings.tryout and settings.candidates else None
+    return Prescreen(experiment) if settings.prescreen and settings.candidates else None

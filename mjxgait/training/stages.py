@@ -21,9 +21,8 @@ from mjxgait.processes import cores
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.blueprint import Numbers, Plan
 from mjxgait.training.generation import (
-    Row,
+    RunParams,
     absorb,
     evaluate,
     first_state,
@@ -31,6 +30,7 @@ from mjxgait.training.generation import (
     promote,
     propose,
 )
+from mjxgait.training.spec import BodyParams, SimulatorSpec
 from mjxgait.types import Evaluation, RequestedTrials
 
 
@@ -102,8 +102,8 @@ class CompiledGeneration:
 
     def step(
         self,
-        numbers: Numbers | None,
-        rows: Row,
+        numbers: BodyParams | None,
+        rows: RunParams,
         states: EvolutionState,
         evaluator: Evaluator | None = None,
     ) -> tuple[EvolutionState, GenerationMetrics]:
@@ -129,42 +129,40 @@ class CompiledGeneration:
         return after
 
 
-def lowered(blueprint: Plan, function: Callable[..., object], *given: object) -> jax.stages.Lowered:
+def lowered(
+    spec: SimulatorSpec, function: Callable[..., object], *given: object
+) -> jax.stages.Lowered:
     """Lower a part of a generation for these shapes.
 
     The program is the same for all settings with these shapes, so the compiler's cache has it.
     """
-    placed = everywhere(blueprint.own)
-    program = jax.jit(
-        functools.partial(function, blueprint), in_shardings=placed, out_shardings=placed
-    )
-    return program.lower(blueprint.numbers, *given)
+    placed = everywhere(spec.own)
+    program = jax.jit(functools.partial(function, spec), in_shardings=placed, out_shardings=placed)
+    return program.lower(spec.numbers, *given)
 
 
 def lower_stages(
-    blueprint: Plan, rows: Row, states: EvolutionState, evaluates: bool = True
+    spec: SimulatorSpec, rows: RunParams, states: EvolutionState, evaluates: bool = True
 ) -> Iterator[tuple[str, jax.stages.Lowered]]:
     """Yield the names and programs for rows and states of these shapes, each traced on demand.
 
     evaluates: whether to include the program that evaluates.
     """
-    first = lowered(blueprint, propose, rows, states)
+    first = lowered(spec, propose, rows, states)
     yield "propose", first
     proposals, starts = first.out_info
     promotes = rows.settings.rollout.promotes
     asked = (first_trials(states, proposals),) if promotes else ()
     given = (rows.settings, starts, proposals.offspring, *asked)
     if evaluates:
-        middle = lowered(blueprint, evaluate, *given)
+        middle = lowered(spec, evaluate, *given)
         yield "evaluate", middle
         evaluation = middle.out_info
     else:
-        evaluation = jax.eval_shape(
-            functools.partial(evaluate, blueprint), blueprint.numbers, *given
-        )
+        evaluation = jax.eval_shape(functools.partial(evaluate, spec), spec.numbers, *given)
     if promotes:
-        yield "promote", lowered(blueprint, promote, rows, states, proposals, evaluation)
-    yield "absorb", lowered(blueprint, absorb, rows, states, proposals, evaluation)
+        yield "promote", lowered(spec, promote, rows, states, proposals, evaluation)
+    yield "absorb", lowered(spec, absorb, rows, states, proposals, evaluation)
 
 
 def compile_stages(
@@ -187,12 +185,12 @@ def compile_stages(
 
 
 def begin(
-    blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
+    spec: SimulatorSpec, numbers: BodyParams | None, settings: Config, key: jax.Array
 ) -> EvolutionState:
     """See `first_state`. All runs, single or in a batch, share one compiled function: they begin
     with the same bits.
     """
-    return _beginning()(blueprint, numbers, settings, key)
+    return _beginning()(spec, numbers, settings, key)
 
 
 @functools.cache
@@ -202,6 +200,6 @@ def _beginning() -> Callable[..., EvolutionState]:
     return jax.jit(first_state, static_argnums=0, compiler_options=options)
 
 
-def embodied(blueprint: Plan, starts: Starts) -> Starts:
-    """See `Plan.embodied`. Jitted, or each of its hundreds of operations is compiled alone."""
-    return jax.jit(blueprint.embodied)(starts)
+def embodied(spec: SimulatorSpec, starts: Starts) -> Starts:
+    """See `SimulatorSpec.embodied`. Jitted, or each of its hundreds of operations is compiled alone."""
+    return jax.jit(spec.embodied)(starts)

@@ -17,7 +17,7 @@ from mjxgait.experiments.ablation.plan import (
     read_study,
 )
 from mjxgait.experiments.ablation.rows import groups
-from mjxgait.tasks.walk.targets import Wishes, wished
+from mjxgait.tasks.walk.targets import WalkTargets, with_targets
 
 TWO = [{"name": "base"}, {"name": "half", "settings": {"evolution": {"mutation_rate": 0.4}}}]
 
@@ -78,7 +78,7 @@ def test_a_variant_may_be_asked_for_a_gait_as_a_walk_is(stool: Creature):
     found = plan(stool, variant=[{"name": "base"}, {"name": "animal", "gait": "natural"}])
     assert found.of("base")[0].config.fitness.wish.asked == ()
     asked = found.of("animal")[0].config
-    walk = wished(resolve_config({}, stool.name, None), stool, Wishes(gait="natural"))
+    walk = with_targets(resolve_config({}, stool.name, None), stool, WalkTargets(gait="natural"))
     assert asked.fitness.wish == walk.fitness.wish
     assert asked.fitness.wish.stride == 1.0
     assert asked.controller == walk.controller

@@ -32,9 +32,9 @@ def stepping(around: Surroundings) -> Callable[..., Any]:
     plant = TreePlant(around)
 
     def step(state: BodyState, torque: jax.Array) -> Any:
-        sensed, workings = plant.forward(state)
-        near = workings.touch.distance if around.floor else None
-        return sensed, near, plant.advance(state, workings, torque)
+        sensed, step_data = plant.forward(state)
+        near = step_data.touch.distance if around.floor else None
+        return sensed, near, plant.advance(state, step_data, torque)
 
     return jax.jit(step)
 

@@ -161,7 +161,7 @@ def evaluation(
 ) -> dict[str, float]:
     """Of one that goes on at 1 m/s. tilt: deg at a moment in between; before: before it counts."""
     settings = RoamConfig(settle=0.5)
-    stats, standards = task.init(), task.standards(settings)
+    stats, params = task.init(), task.params(settings)
     for k in range(task.horizon):
         angle = np.radians({10: before, 100: tilt}.get(k, 0.0))
         turned = jnp.array(
@@ -173,7 +173,7 @@ def evaluation(
             trunk_rot=turned,
             sunk=jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
         )
-        stats = task.update(stats, sensed, jnp.zeros(3), standards, ())
+        stats = task.update(stats, sensed, jnp.zeros(3), params, ())
     return {name: float(value) for name, value in task.evaluate(stats, settings).items()}
 
 
@@ -204,13 +204,13 @@ def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
 
     def jumped(sunk: float = 0.0, again: float = 0.0) -> dict[str, float]:
         """To 0.3 m in the first half of what counts, and to another height in the second."""
-        stats, standards = jumping.init(), jumping.standards(settings)
+        stats, params = jumping.init(), jumping.params(settings)
         heights = {10: 0.7, 60: 0.2, 80: 0.3, 120: again, 140: again / 2}
         for k in range(task.horizon):
             low = CALM.geom_low.at[:].set(1.0).at[1].set(heights.get(k, 0.0))
             deep = jnp.float32(sunk if k == 100 else -1.0)
             sensed = dataclasses.replace(CALM, geom_low=low, sunk=deep)
-            stats = jumping.update(stats, sensed, jnp.zeros(3), standards, ())
+            stats = jumping.update(stats, sensed, jnp.zeros(3), params, ())
         return {name: float(value) for name, value in jumping.evaluate(stats, settings).items()}
 
     assert jumped(again=0.3) == pytest.approx({"height": 0.3, "overlap": 0, "wild": 0})
@@ -239,10 +239,10 @@ def test_to_follow_is_to_get_nearer_to_the_light(task: Roam, follower: type):
     following = follower(task.creature, task.step, task.horizon, task.ends)
     settings = following.Settings(settle=0.0)
     for light, way in (([10.0, 0, 0], 2.0), ([-10.0, 0, 0], -2.0), ([0, 10.0, 0], -0.198)):
-        stats, standards = following.init(), following.standards(settings)
+        stats, params = following.init(), following.params(settings)
         for k in (0, 1):
             sensed = dataclasses.replace(CALM, middle=jnp.array([2.0 * k, 0.0, 0.0]))
-            stats = following.update(stats, sensed, jnp.zeros(3), standards, jnp.array(light))
+            stats = following.update(stats, sensed, jnp.zeros(3), params, jnp.array(light))
         assert float(following.way(stats)) == pytest.approx(way, abs=1e-3)
         evaluation = following.evaluate(
             dataclasses.replace(stats, overlap=jnp.float32(1.0)), settings
@@ -304,8 +304,8 @@ def test_who_gets_nearer_to_all_lights_is_looked_at():
 def test_what_a_follower_promised_counts_from_when_evolution_counted(task: Roam):
     following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
     settings, still = following.Settings(settle=0.5), jnp.zeros(3)
-    standards = following.standards(settings)
-    stats = following.update(following.init(), CALM, still, standards, jnp.ones(3))
+    params = following.params(settings)
+    stats = following.update(following.init(), CALM, still, params, jnp.ones(3))
     assert float(following.outcome(stats)["since"]) == pytest.approx(0.5, abs=task.step)
     acceptance, config = acceptance_of("follow-on-land"), CertificateConfig()
     for told, since in (({"since": 4.0}, 4.0), ({}, config.warmup)):

@@ -106,7 +106,7 @@ def evaluation(task: Swim, given: float, overlap: float = 0.0) -> dict[str, floa
     """Of one of 2 kg that the water pushes with 3 N along x: `given` is the share of its momentum
     that is the water's. Counting begins in motion."""
     settings, step = SwimConfig(settle=0.1), task.step
-    stats, standards = task.init(), task.standards(settings)
+    stats, params = task.init(), task.params(settings)
     push, place = 3.0, 0.0
     for k in range(task.horizon):
         momentum = 1.0 + push / given * step * k
@@ -114,7 +114,7 @@ def evaluation(task: Swim, given: float, overlap: float = 0.0) -> dict[str, floa
         sensed = dataclasses.replace(
             CALM, middle=place * along, momentum=momentum * along, washed=push * along
         )
-        stats = task.update(stats, sensed, jnp.zeros(3), standards, ())
+        stats = task.update(stats, sensed, jnp.zeros(3), params, ())
         place += momentum / 2 * step
     stats = dataclasses.replace(stats, overlap=jnp.float32(overlap))
     return {name: float(value) for name, value in task.evaluate(stats, settings).items()}

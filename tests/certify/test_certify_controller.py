@@ -310,8 +310,8 @@ def test_the_senses_that_tasks_add_are_those_of_evolution(tiny):
         if kind.modular:
             continue
         task = kind.part("task")(tiny, STEP, 1000, tiny.settings.termination)
-        aim = task.aim(SimpleNamespace(goal=jnp.float32(0.8), raised=jnp.float32(0.0)))
-        found |= task.senses(aim, sensed)
+        goal = task.goal(SimpleNamespace(goal=jnp.float32(0.8), raised=jnp.float32(0.0)))
+        found |= task.observations(goal, sensed)
         assert set(task.adds) <= set(found)
     assert {*found, "light"} == ADDED.keys()
     for name, value in found.items():

@@ -110,7 +110,7 @@ ANIMAL = {"stride": 1.0, "duty_factor": 1.0, "reach": 0.0, "pitch": 0.0}
 @pytest.fixture(scope="module")
 def natural(tiny: Creature) -> Walk:
     config = small_config(fitness={"wish": ANIMAL}).fitness
-    return Walk.told(tiny, STEP, HORIZON, tiny.settings.termination, config)
+    return Walk.with_settings(tiny, STEP, HORIZON, tiny.settings.termination, config)
 
 
 def stats_of(task: Walk, speed: float, stride: float = 1.0, duty: float = 1.0, **more):

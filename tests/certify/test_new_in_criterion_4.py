@@ -9,7 +9,7 @@ from mjxgait.certification import CertificateConfig
 from mjxgait.config.schema import Config, RolloutConfig
 from mjxgait.importer.write_toml import few_feet, four_feet
 from mjxgait.plugins import resolve_config
-from mjxgait.tasks.walk.targets import Wishes, configured
+from mjxgait.tasks.walk.targets import WalkTargets, configured
 
 EXAMINED = CertificateConfig().starts
 WALK = {"masses", "late torques", "slopes"}
@@ -32,10 +32,10 @@ def new(rollout: RolloutConfig) -> set[str]:
     return {name for name, disturbed in known.items() if not disturbed}
 
 
-def config_of(name: str, file: str | None = None, **wishes: str) -> Config:
+def config_of(name: str, file: str | None = None, **targets: str) -> Config:
     creature = load_creature(name)
-    if wishes:
-        return configured(creature, None, {}, Wishes(**wishes))
+    if targets:
+        return configured(creature, None, {}, WalkTargets(**targets))
     return resolve_config(creature.settings.train, creature.name, Path(file) if file else None)
 
 

@@ -74,9 +74,9 @@ def test_each_trial_is_one_change_from_the_same_starts(tiny, trotter, monkeypatc
     creature, starts, _ = rest["friction 0.4"]
     assert (creature.model.geom_friction[:, 0] == 0.4).all()
     assert (starts.friction == 1).all()
-    heavier = rest["trunk +20%"][1].mass / plain.mass
-    assert heavier[:, tiny.trunk] == pytest.approx(1.2)
-    assert np.delete(heavier, tiny.trunk, axis=1) == pytest.approx(1.0)
+    with_mass_scale = rest["trunk +20%"][1].mass / plain.mass
+    assert with_mass_scale[:, tiny.trunk] == pytest.approx(1.2)
+    assert np.delete(with_mass_scale, tiny.trunk, axis=1) == pytest.approx(1.0)
     pushed = np.linalg.norm(rest["push of 0.3 √(g·h)"][1].push, axis=1)
     assert pushed == pytest.approx(0.3 * np.sqrt(9.81 * tiny.frame.hip_height))
 

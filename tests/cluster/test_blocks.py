@@ -8,7 +8,7 @@ from helpers import made_up_evaluate, small_config
 from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import AdvanceRows
 from mjxgait.distributed.recipe import Programs, Recipe
-from mjxgait.distributed.rows import Blocks, block_size
+from mjxgait.distributed.rows import ChunkedEvaluator, block_size
 from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.errors import UserError
 from mjxgait.training import experiment, stages
@@ -53,7 +53,7 @@ def test_a_generation_by_blocks_is_that_of_one_program(
     config = small_config(rollout={"block": 3, "promote": promote})
     run = build_experiment(stool, config)
     alone = run.compile()
-    spread = run.compile(Blocks(Scheduler(LocalBackend()), stool, config))
+    spread = run.compile(ChunkedEvaluator(Scheduler(LocalBackend()), stool, config))
     state = run.place(run.init())
     (mine, counts), (theirs, others) = alone(state), spread(state)
     for one, other in zip(

@@ -8,7 +8,7 @@ from helpers import small_config
 
 from mjxgait.creature import Creature
 from mjxgait.distributed.connect import Machine, mismatch, require_same, this
-from mjxgait.distributed.recipe import OwnPart, Recipe
+from mjxgait.distributed.recipe import Recipe, UserCode
 from mjxgait.errors import UserError
 from mjxgait.plugins.registry import find
 
@@ -40,7 +40,7 @@ def test_other_settings_are_another_recipe(stool: Creature):
 
 
 def test_own_code_travels_as_its_text(stool: Creature, tmp_path: Path):
-    part = OwnPart("task", "Idle", "idle_travels.py", OWN)
+    part = UserCode("task", "Idle", "idle_travels.py", OWN)
     Recipe(dict(stool.files), (), (part,)).read()
     assert find("task", "idle_travels.py:Idle").__name__ == "Idle"
 

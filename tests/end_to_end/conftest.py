@@ -27,7 +27,7 @@ from mjxgait.distributed.recipe import Programs
 from mjxgait.distributed.scheduler import LocalBackend
 from mjxgait.experiments.ablation import findings, rows
 from mjxgait.training import loop
-from mjxgait.training.prescreen import Tryout
+from mjxgait.training.prescreen import Prescreen
 
 CERTIFICATE = CertificateConfig.__init__
 PROGRAMS = Programs()
@@ -58,8 +58,8 @@ def sketched(request: pytest.FixtureRequest) -> Iterator[pytest.MonkeyPatch]:
         if not request.config.getoption("--thorough"):
             patch.setattr(loop, "_compiled", unevolved)
             patch.setattr(board, "LocalBackend", partial(Unevolved, PROGRAMS))
-            patch.setattr(Tryout, "begin", lambda tryout: None)
-            patch.setattr(Tryout, "_program", property(untried))
+            patch.setattr(Prescreen, "begin", lambda prescreen: None)
+            patch.setattr(Prescreen, "_program", property(untried))
             patch.setattr(overlap, "SAMPLES", 16)
         yield patch
 

@@ -20,7 +20,7 @@ from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.training.checkpoint import pack
 from mjxgait.training.experiment import Experiment
-from mjxgait.training.prescreen import Tryout
+from mjxgait.training.prescreen import Prescreen
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 
@@ -49,9 +49,9 @@ def embodied(experiment: Experiment) -> EvolutionState:
     raise AssertionError("none of the first population can move")
 
 
-def untried(tryout: Tryout) -> Callable[..., SimpleNamespace]:
-    """Stand in for `Tryout._program`: made-up outcomes, and no program is compiled."""
-    names = tryout._trials.simulator.task.outcomes
+def untried(prescreen: Prescreen) -> Callable[..., SimpleNamespace]:
+    """Stand in for `Prescreen._program`: made-up outcomes, and no program is compiled."""
+    names = prescreen._trials.simulator.task.outcomes
 
     def evaluation(numbers: Any, settings: Any, starts: Any, genomes: Any) -> SimpleNamespace:
         individuals, trials = (jax.tree.leaves(rows)[0].shape[1] for rows in (genomes, starts))

@@ -19,7 +19,7 @@ from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.convert import Imported
 from mjxgait.importer.portrait import standing
-from mjxgait.physics.derived import sense_layout
+from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
 from mjxgait.physics.lane_major.model import check_supported
 from mjxgait.physics.lane_major.padded import difference
@@ -138,7 +138,7 @@ def test_robot_dogs_share_one_program():
 
     def topology(name: str) -> Topology:
         creature = load_files(imported_model(name).files)
-        known = (creature.evolution_model, sense_layout(creature), find_crossings(creature))
+        known = (creature.evolution_model, observation_layout(creature), find_crossings(creature))
         return fast_plant(*known, roomy=True).topology
 
     first, *others = (topology(name) for name in DOGS)

@@ -38,14 +38,16 @@ def said(run, evolution=None, examination=None, kept=None):
     return nothing_left(run, creature, config, config if kept is None else open_run(run)[1])
 
 
-def onward(run, *options):
+def next_goal(run, *options):
     return f"To go on: mjxgait train --resume {run} {' '.join(map(str, options))}"
 
 
 def test_all_generations_are_done(run):
     certify(run, passed=False)
     told = said(run)
-    assert told == f"{run}: nothing is left to do: {ALL}. {onward(run, '--generations', 2 * LAST)}"
+    assert (
+        told == f"{run}: nothing is left to do: {ALL}. {next_goal(run, '--generations', 2 * LAST)}"
+    )
     assert said(run, {"generations": LAST + 1}, {"every": 0}) is None
 
 
@@ -82,7 +84,7 @@ def test_a_certificate_ended_it(run):
     early = {"generations": 9}, {"every": LAST}
     told = said(run, *early)
     assert f"certified with a margin of 0.50 in generation {LAST}. " in told
-    assert told.endswith(onward(run, "--examination.every", 0))
+    assert told.endswith(next_goal(run, "--examination.every", 0))
     certify(run, passed=False)
     assert said(run, *early) is None
 
@@ -91,9 +93,9 @@ def test_the_target_is_reached(run):
     certify(run)
     told = said(run, {"generations": 9, "target": 1.0})
     assert "the target fitness of 1 is reached" in told
-    assert told.endswith(onward(run, "--evolution.target", None))
+    assert told.endswith(next_goal(run, "--evolution.target", None))
     both = said(run, {"target": 1.0})
-    assert both.endswith(onward(run, "--evolution.target", None, "--generations", 2 * LAST))
+    assert both.endswith(next_goal(run, "--evolution.target", None, "--generations", 2 * LAST))
 
 
 def test_what_forced_evolution_ended_does_not_go_on(run):

@@ -51,8 +51,8 @@ def statistics(
     settings = {"physics": request.param, "lanes": 2, "starts": len(BODIES), "terminate": False}
     experiment = build_experiment(stool, small_config(rollout=settings))
     simulator, plant = experiment.simulator, experiment.simulator.plant
-    heavier = jax.jit(plant.heavier)
-    numbers = jax.device_get([heavier(plant.parameters, factor) for factor in BODIES])
+    with_mass_scale = jax.jit(plant.with_mass_scale)
+    numbers = jax.device_get([with_mass_scale(plant.parameters, factor) for factor in BODIES])
     box = Box(*simulator.controller.bounds(experiment.config.controller))
     arguments = jax.tree.map(
         lambda leaf: leaf[None],

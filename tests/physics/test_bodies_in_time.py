@@ -10,7 +10,7 @@ from many_bodies import compiled, stacked
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.physics import heavier_model
-from mjxgait.physics.derived import sense_layout
+from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.types import BodyState, Plant
 
@@ -46,7 +46,7 @@ def quadrupeds() -> list[mujoco.MjModel]:
 @pytest.mark.thorough("test_bodies.py has eighty steps of another body")
 def test_a_shipped_quadruped_whose_body_is_varied(quadrupeds: list[mujoco.MjModel]):
     creature = load_creature(find_creature("tall_quadruped"))
-    layout = sense_layout(creature)
+    layout = observation_layout(creature)
     plant = fast_plant(creature.evolution_model, layout)
     numbers = stacked([plant.parameters_of(model, layout) for model in quadrupeds])
     qpos = np.tile(creature.stand_qpos, (4, 1))

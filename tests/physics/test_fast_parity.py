@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.physics.lane_major import FastPlant, fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import BodyState
@@ -69,7 +69,7 @@ SLIM = {"xla_backend_optimization_level": 0}
 class Scene:
     model: mujoco.MjModel
     plant: FastPlant
-    layout: SenseLayout
+    layout: ObservationLayout
     state: BodyState
     torque: np.ndarray
     damping: np.ndarray
@@ -97,7 +97,7 @@ def scene() -> Scene:
     model = mujoco.MjModel.from_xml_string(XML)
     hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
     watched = np.array([model.geom(name).id for name in WATCHED])
-    layout = SenseLayout(
+    layout = ObservationLayout(
         model.body("trunk").id, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], watched
     )
     rng = np.random.default_rng(2)
@@ -113,11 +113,11 @@ def _everything(plant: Any) -> Everything:
     """From state, damping and torque to all that the three methods give."""
 
     def everything(state: BodyState, damping: jax.Array, torque: jax.Array) -> Any:
-        sensed, workings = plant.forward(state)
+        sensed, step_data = plant.forward(state)
         return (
             sensed,
-            plant.solve_damped(workings, damping, torque),
-            plant.advance(state, workings, torque),
+            plant.solve_damped(step_data, damping, torque),
+            plant.advance(state, step_data, torque),
         )
 
     return everything

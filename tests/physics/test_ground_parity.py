@@ -17,7 +17,7 @@ from physics.test_fast_parity import LANES, SLIM, _everything, _states
 
 from mjxgait.creature.ground.spec import Place, parse_ground
 from mjxgait.creature.ground.surface import lay_ground, named_draws
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.reference.layout import StartFrame
@@ -99,7 +99,7 @@ def plants() -> SimpleNamespace:
     model = mujoco.MjModel.from_xml_string(BALLS)
     hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
     watched = np.array([model.geom(name).id for name in (*FEET, "trunk", "tail")])
-    layout = SenseLayout(
+    layout = ObservationLayout(
         model.body("trunk").id, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], watched
     )
     return SimpleNamespace(

@@ -23,7 +23,7 @@ from mjxgait.creature.overlap import (
     neighbours,
     pair_depths,
 )
-from mjxgait.physics.derived import sense_layout
+from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
@@ -119,7 +119,7 @@ def test_distance_of_two_bars_is_that_of_c_mujoco(kinds: tuple[str, str]):
 
 @pytest.mark.parametrize("make", [fast_plant, mjx_plant], ids=["fast", "mjx"])
 def test_both_plants_measure_what_c_mujoco_measures(make: Any, stool: Creature, poses: np.ndarray):
-    plant = make(stool.evolution_model, sense_layout(stool), find_crossings(stool))
+    plant = make(stool.evolution_model, observation_layout(stool), find_crossings(stool))
     state = states(stool, poses)
     if plant.lane_axis:
         state = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), state)

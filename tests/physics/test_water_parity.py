@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from many_bodies import SLIM, XML
 
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.types import BodyState
 
@@ -46,14 +46,14 @@ def swim(request: pytest.FixtureRequest) -> SimpleNamespace:
     model = swimmer(*request.param)
     hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
     trunk = model.body("trunk").id
-    layout = SenseLayout(
+    layout = ObservationLayout(
         trunk, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], np.array([model.geom("leg").id])
     )
     plant, (state, torque) = fast_plant(model, layout), states(model)
 
     def step(state: BodyState, torque: jax.Array) -> tuple[jax.Array, BodyState]:
-        sensed, workings = plant.forward(state)
-        return sensed.bias, plant.advance(state, workings, torque)
+        sensed, step_data = plant.forward(state)
+        return sensed.bias, plant.advance(state, step_data, torque)
 
     compiled = jax.jit(step).lower(state, torque).compile(compiler_options=SLIM)
     bias, after = compiled(state, torque)

@@ -48,8 +48,8 @@ def lowest_after(creature: Creature, touch_ends: bool) -> float:
     limp = jnp.zeros((creature.model.nv, 1), jnp.float32)
 
     def step(state: BodyState) -> tuple[jax.Array, BodyState]:
-        sensed, workings = plant.forward(state)
-        return jnp.min(sensed.geom_low), plant.advance(state, workings, limp)
+        sensed, step_data = plant.forward(state)
+        return jnp.min(sensed.geom_low), plant.advance(state, step_data, limp)
 
     state = on_its_back(creature)
     program = jax.jit(step).lower(state).compile(compiler_options=SLIM)

@@ -18,8 +18,8 @@ from mjxgait.experiments.repertoire.found import Found
 from mjxgait.experiments.repertoire.neighbours import (
     SECONDS,
     changes,
+    commanded_headings,
     succeeds,
-    told_headings,
 )
 from mjxgait.reference.changing import ChangingReference
 from mjxgait.reference.outcome import Trajectory
@@ -116,14 +116,14 @@ def test_headings_turn_as_the_one_walk_does_and_then_as_the_other(stool: Creatur
     straight = dataclasses.replace(treading(stool), wish={"speed": 0.2})
     turning = dataclasses.replace(straight, wish={"speed": 0.2, "turn": 30.0})
     moments, step = np.array([1.0, 2.0]), 0.01
-    assert told_headings(straight, straight, moments, 500, step) is None
-    told = np.degrees(told_headings(straight, turning, moments, 500, step))
+    assert commanded_headings(straight, straight, moments, 500, step) is None
+    told = np.degrees(commanded_headings(straight, turning, moments, 500, step))
     rates = np.diff(told, axis=1) / step
     for row, moment in enumerate((100, 200)):
         np.testing.assert_allclose(told[row, : moment + 1], 0.0, atol=1e-9)
         assert 0 < rates[row, moment + 50] < 30
         np.testing.assert_allclose(rates[row, moment + 101 :], 30.0)
-    back = np.degrees(told_headings(turning, straight, moments, 500, step))
+    back = np.degrees(commanded_headings(turning, straight, moments, 500, step))
     np.testing.assert_allclose(back[0, :100], 0.3 * np.arange(100), atol=1e-9)
     np.testing.assert_allclose(back[0, 201:], back[0, -1])
 

@@ -10,7 +10,7 @@ from mjxgait.cli import main
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.rendering.gl import working_backend
-from mjxgait.rendering.stage import Entrant, Stage
+from mjxgait.rendering.stage import Participant, Stage
 from mjxgait.rendering.video import Runner, champions_of, moving_pictures
 from mjxgait.rendering.walk import record_walk
 
@@ -34,15 +34,15 @@ def test_everybody_goes_the_same_way(stool_walk, way):
     """Whatever way of its world a creature walks, on the stage it is the stage's."""
     forward, start = np.array(way), np.array([3.0, -2.0])
     walk = moved(stool_walk, 2.0, 0.5)
-    entrant = Entrant(walk, start, forward)
+    participant = Participant(walk, start, forward)
     own = (walk.trunk_pos[-1] - walk.trunk_pos[0])[:2]
     expected = [own @ walk.forward, own @ [-walk.forward[1], walk.forward[0]]]
-    went = entrant.trunk(walk.seconds)[:2] - start
+    went = participant.trunk(walk.seconds)[:2] - start
     assert [went @ forward, went @ [-forward[1], forward[0]]] == pytest.approx(expected)
-    assert entrant.trunk(0.0)[:2] == pytest.approx(start)
-    pos, rot = entrant.poses(0.0)
+    assert participant.trunk(0.0)[:2] == pytest.approx(start)
+    pos, rot = participant.poses(0.0)
     assert np.linalg.det(rot) == pytest.approx(np.ones(len(pos)))
-    flat = entrant.placed(walk.geom_poses(np.array([0]))[0][0])
+    flat = participant.placed(walk.geom_poses(np.array([0]))[0][0])
     np.testing.assert_allclose(pos, flat)
 
 
@@ -66,8 +66,8 @@ def test_lanes_are_as_wide_as_their_creatures(stool_walk, crab_walk):
     assert (gaps > halves).all()
     assert gaps[0] == pytest.approx(gaps[1])
     # Nobody is outside of the picture.
-    for place, entrant in enumerate(stage.entrants):
-        pixels = stage.camera(0).pixels(entrant.outline + stage.lanes[place])
+    for place, participant in enumerate(stage.entrants):
+        pixels = stage.camera(0).pixels(participant.outline + stage.lanes[place])
         assert (pixels > 0).all()
         assert (pixels < [320, 180]).all()
 

@@ -195,7 +195,7 @@ class Programs:
     command: ClassVar[Command] = "pose"
 
     @classmethod
-    def told(
+    def with_settings(
         cls, creature: Body, step: float, settings: ProgramConfig, added: Sequence[str]
     ) -> "Programs":
         """Return the controller of a body. added: names of the observations that the task adds."""

@@ -35,7 +35,7 @@ class Brains:
     grows: ClassVar[bool] = True
 
     @classmethod
-    def told(
+    def with_settings(
         cls, creature: Body, step: float, settings: BrainConfig, added: Sequence[str]
     ) -> "Brains":
         """Return the controller. added: names of the observations that the task adds."""

@@ -288,7 +288,7 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
         found = pool.map(
             partial(_evaluate, folder / CREATURE, plan.study.grounds, plan.study.certify),
             [champion_path(folder, plan, run) for run in missing],
-            [_found_somebody(lines[run.variant, run.seed]) for run in missing],
+            [_has_finite_best(lines[run.variant, run.seed]) for run in missing],
         )
         for number, (run, evaluation) in enumerate(zip(missing, found, strict=True), 1):
             result = _result(plan.study, run, lines[run.variant, run.seed], evaluation)
@@ -307,7 +307,7 @@ def _result(study: Study, run: Run, lines: Sequence[Line], evaluation: Evaluatio
     ways, certified = evaluation
     walk, up = ways[study.grounds[0]]
     best = [-math.inf if line["best"] is None else line["best"] for line in lines]
-    finite, threshold = _found_somebody(lines), study.threshold
+    finite, threshold = _has_finite_best(lines), study.threshold
     reached = [i for i, value in enumerate(best) if threshold is not None and value >= threshold]
     return Result(
         variant=run.variant,
@@ -324,7 +324,7 @@ def _result(study: Study, run: Run, lines: Sequence[Line], evaluation: Evaluatio
     )
 
 
-def _found_somebody(lines: Sequence[Line]) -> bool:
+def _has_finite_best(lines: Sequence[Line]) -> bool:
     """Return whether the best fitness at the end is finite."""
     return lines[-1]["best"] is not None
 

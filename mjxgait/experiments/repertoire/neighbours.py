@@ -185,7 +185,7 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
     step = float(creature.model.opt.timestep)
     moments = WARMUP + np.arange(MOMENTS) / MOMENTS
     steps = round((moments[-1] + SECONDS + SETTLES + WATCHED) / step)
-    told = told_headings(before, after, moments, steps, step)
+    told = commanded_headings(before, after, moments, steps, step)
     twin = ChangingReference(creature, before, after, step, moments, SECONDS)
     outcome = simulate(
         creature,
@@ -200,7 +200,7 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
     return outcome.stayed_up & _as_told(creature, outcome, float(after.wish["speed"]))
 
 
-def told_headings(
+def commanded_headings(
     before: Champion, after: Champion, moments: np.ndarray, steps: int, step: float
 ) -> np.ndarray | None:
     """Return headings [S, T] rad: turning as one walk, then as the other; None if neither turns."""
@@ -214,7 +214,7 @@ def told_headings(
 
 def _as_told(creature: Creature, outcome: Outcome, speed: float) -> np.ndarray:
     """Return [S] for the last seconds: speed by chords of a second, and the mean heading."""
-    limits, film = CertificateConfig().wishes, outcome.trajectory
+    limits, film = CertificateConfig().targets, outcome.trajectory
     watched, second = round(WATCHED / film.time_step), round(1.0 / film.time_step)
     root = creature.root_qpos
     place = film.qpos[:, -watched:, root : root + 2]

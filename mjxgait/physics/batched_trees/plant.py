@@ -214,8 +214,8 @@ class TreePlant(Plant[Moment]):
         return one_kernel(self._forward)(state)
 
     @override
-    def solve_damped(self, workings: Moment, damping: jax.Array, force: jax.Array) -> jax.Array:
-        return jnp.stack(one_kernel(_solve_damped)(workings.mass, damping, force))
+    def solve_damped(self, step_data: Moment, damping: jax.Array, force: jax.Array) -> jax.Array:
+        return jnp.stack(one_kernel(_solve_damped)(step_data.mass, damping, force))
 
     def overlap(self, state: BodyState) -> jax.Array:
         """See `Plant.overlap`; any pose counts, because these bodies have no drawn pose."""
@@ -231,8 +231,8 @@ class TreePlant(Plant[Moment]):
         return qpos.at[2].add(-jnp.min(lows(lane, poses)))
 
     @override
-    def advance(self, state: BodyState, workings: Moment, torque: jax.Array) -> BodyState:
-        after = one_kernel(self._advance)(state, workings, torque)
+    def advance(self, state: BodyState, step_data: Moment, torque: jax.Array) -> BodyState:
+        after = one_kernel(self._advance)(state, step_data, torque)
         return dataclasses.replace(after, parameters=state.parameters)
 
     def _forward(self, state: BodyState) -> tuple[Sensed, Moment]:

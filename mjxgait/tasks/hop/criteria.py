@@ -74,7 +74,7 @@ class GoalCriteria(Unasked, abc.ABC):
         """See `AcceptanceCriteria`: evolution has promised nothing."""
         return ()
 
-    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         """See `AcceptanceCriteria`: the same."""
         return goal
 
@@ -262,7 +262,7 @@ class TravelCriteria(GoalCriteria):
         return config.travel
 
     @override
-    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         reached = goal - way <= NEAR * first
         return np.where(reached, goal + first, goal)
 
@@ -297,7 +297,7 @@ class TravelCriteria(GoalCriteria):
         """See `AcceptanceCriteria`: distance travelled, and number of goals."""
         way, goal, goals = whole.trunk_pos[:, 0], np.array(whole.goal), 0
         for place in np.maximum.accumulate(way):
-            ahead = self.onward(goal, np.array(whole.goal), place)
+            ahead = self.next_goal(goal, np.array(whole.goal), place)
             goals, goal = goals + int(ahead > goal), ahead
         seconds = len(way) * whole.time_step
         return {

@@ -64,13 +64,13 @@ THERE, BENEATH = 0.6, 0.05
 
 
 @pytree
-class Aim:
+class Goal:
     """Goal and bar of one trial.
 
-    goal: [] m ahead of the start. raised: [] m by which the bar is above its final height.
+    ahead: [] m from the start to the goal. raised: [] m by which the bar is above its final height.
     """
 
-    goal: jax.Array
+    ahead: jax.Array
     raised: jax.Array
 
 
@@ -89,7 +89,7 @@ class EpisodeStats(hop.EpisodeStats):
 
 
 @pytree
-class Standards(hop.Standards):
+class TaskParams(hop.TaskParams):
     """See `hop.Standards`. height: [] m, of the bar."""
 
     height: jax.Array
@@ -101,7 +101,7 @@ class Limbo(Hop):
     Settings = LimboConfig
     outcomes = (*Hop.outcomes, "bar")
     adds = (*Hop.adds, "bar_distance")
-    climbs = True
+    has_curriculum = True
     goals, nominal = LIMBO_GOALS, LIMBO_NOMINAL_GOAL
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
@@ -120,28 +120,28 @@ class Limbo(Hop):
         steps: jax.Array | int = settings.lowering
         return steps
 
-    def harder(self, trials: Starts, settings: LimboConfig, level: jax.Array) -> Starts:
+    def at_level(self, trials: Starts, settings: LimboConfig, level: jax.Array) -> Starts:
         """See `Task`: the bar comes down, so that hoppers learn to duck little by little."""
         left = 1.0 - ramped(settings.lowering, level)
         raised = jnp.full(trials.friction.shape, settings.higher * left)
         return dataclasses.replace(trials, raised=raised)
 
-    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+    def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """See `Task`: at the goal in the end, and hardly in the bar."""
         return (terms[MISSED] <= THERE) & (terms["bar"] <= BENEATH)
 
     @override
-    def aim(self, trial: Starts) -> Any:
-        return Aim(super().aim(trial), jnp.asarray(trial.raised))
+    def goal(self, trial: Starts) -> Any:
+        return Goal(super().goal(trial), jnp.asarray(trial.raised))
 
     @override
-    def standards(self, settings: Any) -> Standards:
+    def params(self, settings: Any) -> TaskParams:
         height = jnp.asarray(settings.height, jnp.float32)
-        return Standards(**vars(super().standards(settings)), height=height)
+        return TaskParams(**vars(super().params(settings)), height=height)
 
     @override
-    def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
-        return super().senses(aim.goal, sensed) | {
+    def observations(self, goal: Any, sensed: Sensed) -> dict[str, jax.Array]:
+        return super().observations(goal.ahead, sensed) | {
             "bar_distance": bar_distance(self.creature, sensed)
         }
 
@@ -151,12 +151,10 @@ class Limbo(Hop):
         return EpisodeStats(**vars(super().init()), bar=none, raised=none, height=none)
 
     @override
-    def update(
-        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
-    ) -> Any:
-        after: Any = super().update(stats, sensed, torque, standards, aim.goal)
-        deepest = jnp.maximum(stats.bar, intrusion(self.creature, sensed, standards.height))
-        return dataclasses.replace(after, bar=deepest, raised=aim.raised, height=standards.height)
+    def update(self, stats: Any, sensed: Sensed, torque: jax.Array, params: Any, goal: Any) -> Any:
+        after: Any = super().update(stats, sensed, torque, params, goal.ahead)
+        deepest = jnp.maximum(stats.bar, intrusion(self.creature, sensed, params.height))
+        return dataclasses.replace(after, bar=deepest, raised=goal.raised, height=params.height)
 
     @override
     def evaluate(self, stats: Any, settings: object) -> dict[str, jax.Array]:

@@ -51,7 +51,7 @@ class EpisodeStats(protocol.EpisodeStats):
 
 
 @pytree
-class Standards:
+class TaskParams:
     """Task parameters of an episode.
 
     rest: [] steps without motion that end an episode; never if 0.

@@ -17,7 +17,7 @@ from mjxgait.tasks.hop.config import GOALS, NEAR, NOMINAL_GOAL, GoalConfig, HopC
 from mjxgait.tasks.hop.stats import (
     GOAL,
     EpisodeStats,
-    Standards,
+    TaskParams,
     away,
     empty,
     fitness_terms,
@@ -55,7 +55,7 @@ class Hop(PlainTask):
         self.settings: Any = settings or self.Settings()
 
     @classmethod
-    def told(
+    def with_settings(
         cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: GoalConfig
     ) -> "Hop":
         """Return the task with these settings, which decide the terms."""
@@ -80,17 +80,17 @@ class Hop(PlainTask):
         goals = (low + (high - low) * drawn).at[0].set(self.nominal)
         return dataclasses.replace(starts, goal=goals)
 
-    def aim(self, trial: Starts) -> jax.Array:
+    def goal(self, trial: Starts) -> jax.Array:
         """See `Task`: the goal [] in m ahead of the start."""
         return jnp.asarray(trial.goal)
 
     @override
-    def standards(self, settings: GoalConfig) -> Standards:
-        return Standards(jnp.round(settings.rest / self.step))
+    def params(self, settings: GoalConfig) -> TaskParams:
+        return TaskParams(jnp.round(settings.rest / self.step))
 
     @override
-    def senses(self, aim: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
-        return {"goal_distance": goal_distance(self.creature, aim, sensed)}
+    def observations(self, goal: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
+        return {"goal_distance": goal_distance(self.creature, goal, sensed)}
 
     @override
     def init(self) -> EpisodeStats:
@@ -103,12 +103,12 @@ class Hop(PlainTask):
         stats: EpisodeStats,
         sensed: Sensed,
         torque: jax.Array,
-        standards: Standards,
-        aim: jax.Array,
+        params: TaskParams,
+        goal: jax.Array,
     ) -> EpisodeStats:
-        after = updated(self.creature, self.step, stats, sensed, aim)
+        after = updated(self.creature, self.step, stats, sensed, goal)
         after = with_extras(after, sensed, torque, self.step, self.sub_goals)
-        return rested(after, self.horizon, standards.rest, touches(self.creature, sensed))
+        return rested(after, self.horizon, params.rest, touches(self.creature, sensed))
 
     @override
     def evaluate(self, stats: EpisodeStats, settings: HopConfig) -> dict[str, jax.Array]:
@@ -137,13 +137,13 @@ class TravelStats(hop.EpisodeStats):
 
 
 @pytree
-class Aim:
+class Goal:
     """Goal of the moment.
 
-    goal: [] m ahead of the start. spacing: [] m from one goal to the next.
+    ahead: [] m from the start to the goal. spacing: [] m from one goal to the next.
     """
 
-    goal: jax.Array
+    ahead: jax.Array
     spacing: jax.Array
 
 
@@ -153,20 +153,20 @@ class Travel(Hop):
     Settings: ClassVar[type] = TravelConfig
     outcomes = ("goals", "way", "seconds")
 
-    def aim(self, trial: Starts) -> Any:
+    def goal(self, trial: Starts) -> Any:
         """See `Task`: the distance to the first goal is also the spacing of all others."""
         goal = jnp.asarray(trial.goal)
-        return Aim(goal, goal)
+        return Goal(goal, goal)
 
-    def onward(self, aim: Aim, sensed: Sensed) -> Aim:
+    def next_goal(self, goal: Goal, sensed: Sensed) -> Goal:
         """See `Task`: a goal that is near, or passed, moves on."""
-        left = hop.goal_distance(self.creature, aim.goal, sensed)
-        reached = left <= NEAR * aim.spacing
-        return dataclasses.replace(aim, goal=aim.goal + jnp.where(reached, aim.spacing, 0.0))
+        left = hop.goal_distance(self.creature, goal.ahead, sensed)
+        reached = left <= NEAR * goal.spacing
+        return dataclasses.replace(goal, ahead=goal.ahead + jnp.where(reached, goal.spacing, 0.0))
 
     @override
-    def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
-        return super().senses(aim.goal, sensed)
+    def observations(self, goal: Any, sensed: Sensed) -> dict[str, jax.Array]:
+        return super().observations(goal.ahead, sensed)
 
     @override
     def init(self) -> TravelStats:
@@ -174,10 +174,10 @@ class Travel(Hop):
 
     @override
     def update(
-        self, stats: EpisodeStats, sensed: Sensed, torque: jax.Array, standards: Standards, aim: Any
+        self, stats: EpisodeStats, sensed: Sensed, torque: jax.Array, params: TaskParams, goal: Any
     ) -> Any:
-        after: Any = super().update(stats, sensed, torque, standards, aim.goal)
-        reached = jnp.round(aim.goal / aim.spacing).astype(jnp.int32) - 1
+        after: Any = super().update(stats, sensed, torque, params, goal.ahead)
+        reached = jnp.round(goal.ahead / goal.spacing).astype(jnp.int32) - 1
         return dataclasses.replace(after, reached=reached)
 
     def evaluate(self, stats: EpisodeStats, settings: object) -> dict[str, jax.Array]:

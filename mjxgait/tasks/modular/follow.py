@@ -44,24 +44,24 @@ class Following(GoingTask):
         lights = LIGHT * jnp.vstack([jnp.array([[1.0, 0.0, 0.0]]), drawn.reshape(-1, 3)])
         return dataclasses.replace(super().trials(key, creature, settings), light=lights)
 
-    def aim(self, trial: Starts) -> jax.Array:
+    def goal(self, trial: Starts) -> jax.Array:
         """See `Task`: place [3] of the light in m."""
         assert trial.light is not None
         return trial.qpos[:3] + trial.light
 
-    def senses(self, aim: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
+    def observations(self, goal: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
         """See `Task`: direction [G, 3] of the light in the axes of each block."""
         assert sensed.geom_rot is not None
-        there = aim - sensed.geom_pos
+        there = goal - sensed.geom_pos
         there = there / jnp.sqrt(jnp.sum(there**2, axis=1, keepdims=True))
         return {"light": jnp.sum(sensed.geom_rot * there[:, None], axis=2)}
 
     @override
     def update(
-        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: jax.Array
+        self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: jax.Array
     ) -> Any:
-        after = super().update(stats, sensed, torque, standards, aim)
-        return dataclasses.replace(after, light=aim, since=standards)
+        after = super().update(stats, sensed, torque, params, goal)
+        return dataclasses.replace(after, light=goal, since=params)
 
     @override
     def way(self, stats: Any) -> jax.Array:

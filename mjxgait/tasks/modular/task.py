@@ -73,12 +73,12 @@ class BlocksTask(PlainTask):
             damping=jnp.ones((count, joints)),
         )
 
-    def standards(self, settings: BlocksConfig) -> jax.Array:
+    def params(self, settings: BlocksConfig) -> jax.Array:
         """See `Task`: the first step [] that counts."""
         return jnp.round(settings.settle / self.step).astype(jnp.int32)
 
     @override
-    def ended(self, sensed: Sensed, aim: object) -> jax.Array:
+    def ended(self, sensed: Sensed, goal: object) -> jax.Array:
         speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
         wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
         assert sensed.past is not None
@@ -124,14 +124,14 @@ class GoingTask(BlocksTask):
         }
 
     def update(
-        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+        self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> Any:
         """See `Task`: the place now, and when counting began."""
         assert sensed.middle is not None
         return dataclasses.replace(
             stats,
             steps=stats.steps + 1,
-            settled=jnp.where(stats.steps <= standards, sensed.middle, stats.settled),
+            settled=jnp.where(stats.steps <= params, sensed.middle, stats.settled),
             place=sensed.middle,
         )
 
@@ -188,12 +188,12 @@ class Swim(GoingTask):
 
     @override
     def update(
-        self, stats: SwimStats, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+        self, stats: SwimStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> SwimStats:
         assert sensed.momentum is not None
         assert sensed.washed is not None
         begins, momentum, push = (
-            stats.steps <= standards,
+            stats.steps <= params,
             sensed.momentum,
             sensed.washed * self.step,
         )
@@ -203,7 +203,7 @@ class Swim(GoingTask):
             begins, 0.0, jnp.maximum(stats.lacking, length(momentum - began - given))
         )
         return dataclasses.replace(
-            super().update(stats, sensed, torque, standards, aim),
+            super().update(stats, sensed, torque, params, goal),
             began=began,
             given=given + push,
             exchanged=jnp.where(begins, 0.0, stats.exchanged) + length(push),
@@ -245,14 +245,14 @@ class Roam(GoingTask):
 
     @override
     def update(
-        self, stats: RoamStats, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+        self, stats: RoamStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> RoamStats:
         assert sensed.sunk is not None
-        begins = stats.steps <= standards
+        begins = stats.steps <= params
         upwards = jnp.where(begins, sensed.trunk_rot[2], stats.upwards)
         upright = jnp.sum(sensed.trunk_rot[2] * upwards)
         return dataclasses.replace(
-            super().update(stats, sensed, torque, standards, aim),
+            super().update(stats, sensed, torque, params, goal),
             overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, sensed.sunk)),
             upwards=upwards,
             upright=jnp.where(begins, 1.0, jnp.minimum(stats.upright, upright)),
@@ -308,11 +308,11 @@ class Jump(BlocksTask):
 
     @override
     def update(
-        self, stats: JumpStats, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: object
+        self, stats: JumpStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: object
     ) -> JumpStats:
         assert sensed.sunk is not None
-        begins, low = stats.steps <= standards, jnp.min(sensed.geom_low)
-        span = SPANS * (stats.steps - standards) // jnp.maximum(self.horizon - standards, 1)
+        begins, low = stats.steps <= params, jnp.min(sensed.geom_low)
+        span = SPANS * (stats.steps - params) // jnp.maximum(self.horizon - params, 1)
         now = (jnp.arange(SPANS) == span) & ~begins
         return dataclasses.replace(
             stats,

@@ -67,7 +67,7 @@ class Turn(PlainTask):
 
     @override
     def update(
-        self, stats: TurnStats, sensed: Sensed, torque: jax.Array, standards: object, aim: object
+        self, stats: TurnStats, sensed: Sensed, torque: jax.Array, params: object, goal: object
     ) -> TurnStats:
         place = sensed.trunk_pos[:2]
         start = jnp.where(stats.steps == 0, place, stats.start)

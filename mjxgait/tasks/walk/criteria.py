@@ -52,12 +52,12 @@ from mjxgait.tasks.walk.gaits import gait_of, transition
 from mjxgait.tasks.walk.target_criteria import (
     Wish,
     as_asked,
+    commanded_heading,
     draw_commands,
     following,
     heading_off,
     posture,
     steered,
-    told_heading,
     unrolled,
 )
 
@@ -87,8 +87,8 @@ class WalkCriteria(StaysUp):
         return WalkCriteria(wish) if wish else self
 
     @override
-    def told(self, steps: int, time_step: float) -> np.ndarray | None:
-        return told_heading(self.wish, steps, time_step)
+    def commanded_heading(self, steps: int, time_step: float) -> np.ndarray | None:
+        return commanded_heading(self.wish, steps, time_step)
 
     @override
     def commands(
@@ -96,13 +96,13 @@ class WalkCriteria(StaysUp):
     ) -> np.ndarray | None:
         if "steer" not in self.wish:
             return None
-        return draw_commands(self.wish["steer"], config.wishes.commands, steps, time_step, rng)
+        return draw_commands(self.wish["steer"], config.targets.commands, steps, time_step, rng)
 
     def obeyed(
-        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+        self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """See `AcceptanceCriteria`: 11."""
-        return (steered(outcome, told, config.wishes),)
+        return (steered(outcome, commanded, config.targets),)
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
@@ -111,14 +111,14 @@ class WalkCriteria(StaysUp):
         config = following(config, self.wish, whole.dimensions)
         whole, halved = (unrolled(recording, self.wish) for recording in (whole, halved))
         window = whole.window(config.warmup)
-        wishes = (as_asked(window, self.wish, config),) if self.wish else ()
+        targets = (as_asked(window, self.wish, config),) if self.wish else ()
         return (
             *basic(whole, config),
             half_step(whole, halved, config),
             gait(window, config.gait, self.wish),
             physics(window, config.physics),
             parts(window, config.parts),
-            *wishes,
+            *targets,
         )
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:

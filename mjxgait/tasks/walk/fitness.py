@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from mjxgait.creature.body import Body
 from mjxgait.tasks.base import Reason, cost_of_transport, crossed, ramped
-from mjxgait.tasks.walk.config import LIKENESS, WalkConfig, Weights, WishConfig
+from mjxgait.tasks.walk.config import LIKENESS, TargetConfig, WalkConfig, Weights
 from mjxgait.tasks.walk.gaits import GRAVITY, animal_duty, animal_stride, most_strides, stride_limit
 from mjxgait.tasks.walk.stats import EpisodeStats, TargetStats, gait_missed
 
@@ -217,7 +217,7 @@ def hasty(creature: Body, config: WalkConfig, step: float, stats: TargetStats) -
 
 
 def missed(
-    creature: Body, wish: WishConfig, step: float, horizon: int, stats: TargetStats
+    creature: Body, wish: TargetConfig, step: float, horizon: int, stats: TargetStats
 ) -> dict[str, jax.Array]:
     """Error [] of each target that is set, from 0 to 1; turns already count in the distance."""
     lived, frame = jnp.maximum(stats.steps, 1), creature.frame
@@ -273,7 +273,7 @@ def steady_speed(step: float, horizon: int, stats: EpisodeStats) -> jax.Array:
     return way / (jnp.maximum(jnp.where(late, stats.steps - half, stats.steps), 1) * step)
 
 
-def wish_weights(wish: WishConfig) -> dict[str, float]:
+def target_weights(wish: TargetConfig) -> dict[str, float]:
     """Weights of the targets that are set and have a term of their own."""
     return {n: getattr(wish.weights, n) for n in wish.asked if hasattr(wish.weights, n)}
 
@@ -285,7 +285,7 @@ def _half_at(near: float, off: jax.Array) -> jax.Array:
 
 def _shared(values: dict[str, jax.Array], config: WalkConfig) -> dict[str, jax.Array]:
     """Scale the penalties down so that they cost no more than was earned."""
-    weights = {name: getattr(config.weights, name) for name in TERMS} | wish_weights(config.wish)
+    weights = {name: getattr(config.weights, name) for name in TERMS} | target_weights(config.wish)
     costs = [weights[name] * value for name, value in values.items() if name not in REWARDS]
     cost = jnp.maximum(sum(costs, start=jnp.zeros(())), 0.0)
     earned = sum(weights[name] * jnp.maximum(values[name], 0.0) for name in REWARDS)

@@ -305,7 +305,7 @@ def target_stats(stats: EpisodeStats, feet: int) -> TargetStats:
     )
 
 
-def wish_updated(
+def target_updated(
     creature: Body, before: TargetStats, after: EpisodeStats, sensed: Sensed
 ) -> TargetStats:
     """Return the statistics after one more step; `after` holds those of every walk."""

@@ -16,12 +16,12 @@ from mjxgait.creature.settings import Termination
 from mjxgait.tasks.base import hardness
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.starts import Starts, draw_starts, milder
-from mjxgait.tasks.walk.config import WalkConfig, WishConfig
+from mjxgait.tasks.walk.config import TargetConfig, WalkConfig
 from mjxgait.tasks.walk.fitness import (
     fitness_terms,
     signed_weights,
+    target_weights,
     terms_under,
-    wish_weights,
     wished_terms,
 )
 from mjxgait.tasks.walk.stats import (
@@ -30,7 +30,7 @@ from mjxgait.tasks.walk.stats import (
     TargetStats,
     along,
     target_stats,
-    wish_updated,
+    target_updated,
     wrapped,
 )
 from mjxgait.types import Sensed
@@ -64,28 +64,28 @@ class Walk(PlainTask):
         return terms_under(self.settings.weights)
 
     @classmethod
-    def told(
+    def with_settings(
         cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: WalkConfig
     ) -> "Walk":
         """Return the task with these settings; targets need additional statistics."""
         if settings.wish.asked and cls is Walk:
-            return AskedWalk(body, step, horizon, ends, settings)
+            return TargetedWalk(body, step, horizon, ends, settings)
         return cls(body, step, horizon, ends, settings)
 
     @property
     @override
-    def climbs(self) -> bool:
+    def has_curriculum(self) -> bool:
         return self.settings.hardening > 0
 
     @override
     def levels(self, settings: WalkConfig) -> int:
         return settings.hardening
 
-    def harder(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
+    def at_level(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
         """See `Task`: disturbances grow, so that individuals learn to withstand them bit by bit."""
         return milder(trials, hardness(settings.hardening, level))
 
-    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+    def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """See `Task`: hardly any falls."""
         return terms["fall"] <= FALLEN
 
@@ -93,7 +93,7 @@ class Walk(PlainTask):
     def _recorder(self) -> StatsRecorder:
         return StatsRecorder(self.creature, self.step, self.horizon // 2, self.settings.contact)
 
-    def standards(self, settings: WalkConfig) -> jax.Array:
+    def params(self, settings: WalkConfig) -> jax.Array:
         """See `Task`: the wanted clearance [] of each swing in m."""
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
@@ -103,9 +103,9 @@ class Walk(PlainTask):
 
     @override
     def update(
-        self, stats: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+        self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> EpisodeStats:
-        return self._recorder.update(stats, sensed, torque, standards)
+        return self._recorder.update(stats, sensed, torque, params)
 
     @override
     def evaluate(self, stats: Any, settings: WalkConfig) -> dict[str, jax.Array]:
@@ -124,22 +124,22 @@ class Walk(PlainTask):
         return signed_weights(settings, generation)
 
 
-class AskedWalk(Walk):
-    """Walk with targets; see `WishConfig`.
+class TargetedWalk(Walk):
+    """Walk with targets; see `TargetConfig`.
 
     A turn is commanded as a heading that turns. Distances are measured along it: forward and to the
     left of the heading commanded at each moment.
     """
 
     @property
-    def wish(self) -> WishConfig:
+    def wish(self) -> TargetConfig:
         """Targets of the walk."""
         return self.settings.wish
 
     @property
     @override
     def terms(self) -> tuple[str, ...]:
-        return (*super().terms, *wish_weights(self.wish))
+        return (*super().terms, *target_weights(self.wish))
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`: the usual initial conditions, and the rate of the commanded turn.
@@ -158,22 +158,22 @@ class AskedWalk(Walk):
             return starts
         return dataclasses.replace(starts, turn=jnp.radians(rate))
 
-    def aim(self, trial: Starts) -> Heading:
+    def goal(self, trial: Starts) -> Heading:
         """See `Task`: the commanded heading [] in rad, and its change per step."""
         if trial.turn is None:
             return ()
         return jnp.zeros(()), trial.turn * self.step
 
     @override
-    def onward(self, aim: Heading, sensed: Sensed) -> Heading:
-        return (aim[0] + aim[1], aim[1]) if aim else aim
+    def next_goal(self, goal: Heading, sensed: Sensed) -> Heading:
+        return (goal[0] + goal[1], goal[1]) if goal else goal
 
-    def senses(self, aim: Heading, sensed: Sensed) -> dict[str, jax.Array]:
+    def observations(self, goal: Heading, sensed: Sensed) -> dict[str, jax.Array]:
         """See `Task`: with a commanded heading there is no line to return to."""
-        if not aim:
+        if not goal:
             return {}
         heading = sense(self.creature, sensed, jnp.zeros(()), ["heading"])["heading"]
-        return {"heading": wrapped(heading - aim[0]), "aside": jnp.zeros(())}
+        return {"heading": wrapped(heading - goal[0]), "aside": jnp.zeros(())}
 
     @override
     def init(self) -> TargetStats:
@@ -185,12 +185,12 @@ class AskedWalk(Walk):
         stats: TargetStats,
         sensed: Sensed,
         torque: jax.Array,
-        standards: jax.Array,
-        aim: Heading,
+        params: jax.Array,
+        goal: Heading,
     ) -> TargetStats:
-        plain = self._recorder.update(stats, sensed, torque, standards)
-        after = wish_updated(self.creature, stats, plain, sensed)
-        return along(stats, after, aim[0], self.horizon // 2) if aim else after
+        plain = self._recorder.update(stats, sensed, torque, params)
+        after = target_updated(self.creature, stats, plain, sensed)
+        return along(stats, after, goal[0], self.horizon // 2) if goal else after
 
     @override
     def evaluate(self, stats: TargetStats, settings: WalkConfig) -> dict[str, jax.Array]:
@@ -198,7 +198,7 @@ class AskedWalk(Walk):
 
     @override
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
-        wished = wish_weights(settings.wish)
+        with_targets = target_weights(settings.wish)
         return super().weights(settings, generation) | {
-            n: -jnp.float32(w) for n, w in wished.items()
+            n: -jnp.float32(w) for n, w in with_targets.items()
         }

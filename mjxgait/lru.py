@@ -7,7 +7,7 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-class Latest(collections.OrderedDict[Hashable, T]):
+class LruCache(collections.OrderedDict[Hashable, T]):
     """Cache of the `count` values used last."""
 
     def __init__(self, count: int) -> None:

@@ -13,7 +13,7 @@ from typing_extensions import override
 
 from mjxgait.config.schema import Config, RolloutConfig
 from mjxgait.controllers.base import Bodied, BodiedController, Controller
-from mjxgait.controllers.observations import check_senses
+from mjxgait.controllers.observations import check_observations
 from mjxgait.controllers.sims_brain.controller import capacity_of
 from mjxgait.controllers.sims_brain.genotype import Capacity
 from mjxgait.controllers.sims_brain.operators import Genotype
@@ -74,11 +74,11 @@ class SizeGrowth(Growth[ModelPlant, Bodied]):
         # The trunk has index -1, where the factor is 1.
         factors = jnp.exp(jnp.append(genome.sizes, 0.0))[known.size_of]
         one = plant.parameters
-        if start.heaviness is not None:
-            one = plant.heavier(one, start.heaviness)
+        if start.mass_scale is not None:
+            one = plant.with_mass_scale(one, start.mass_scale)
         rises = known.upwards.astype(np.float32)
         qpos = start.qpos + self._lift(factors) * rises
-        return dataclasses.replace(start, qpos=qpos, numbers=plant.resized(one, factors))
+        return dataclasses.replace(start, qpos=qpos, numbers=plant.with_length_scale(one, factors))
 
     def _lift(self, factors: jax.Array) -> jax.Array:
         """Return the rise [] of the trunk in m with these factors [B]."""
@@ -104,7 +104,7 @@ LANES = 64
 
 
 @pytree
-class Numbers:
+class BodyParams:
     """All body parameters that the program reads. plant: see `Plant.parameters`."""
 
     body: GivenBody
@@ -112,7 +112,7 @@ class Numbers:
     plant: object
 
 
-class Plan(Protocol):
+class SimulatorSpec(Protocol):
     """Specification of a simulator on the host, before its program is traced."""
 
     @property
@@ -121,7 +121,7 @@ class Plan(Protocol):
         ...
 
     @property
-    def numbers(self) -> Numbers | None:
+    def numbers(self) -> BodyParams | None:
         """Body parameters to pass to the program; None if the body is constant in it or grows."""
         ...
 
@@ -134,13 +134,13 @@ class Plan(Protocol):
         """Return the starts with the body parameters that follow from them."""
         ...
 
-    def simulator(self, numbers: Numbers | None = None) -> Simulator:
+    def simulator(self, numbers: BodyParams | None = None) -> Simulator:
         """Return the simulator of the creature, or of the body with these parameters."""
         ...
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Blueprint:
+class ModelSpec:
     """Specification from a creature and settings. plant, lanes: see `make_plant`.
 
     growth: computes an individual's body if bodies evolve.
@@ -153,13 +153,13 @@ class Blueprint:
     growth: SizeGrowth | None = None
 
     @property
-    def numbers(self) -> Numbers | None:
+    def numbers(self) -> BodyParams | None:
         """Body parameters to pass to the program; None if the body is constant in it."""
         if self.config.rollout.body == "constants":
             return None
         ends = what_ends(self.creature, self.config.rollout)
         single = jax.tree.map(lambda x: np.asarray(x, np.float32), self.plant.parameters)
-        return Numbers(given_body(self.creature), given_ends(ends), single)
+        return BodyParams(given_body(self.creature), given_ends(ends), single)
 
     @functools.cached_property
     def own(self) -> Simulator:
@@ -168,13 +168,13 @@ class Blueprint:
 
     def embodied(self, starts: Starts) -> Starts:
         """Return the starts with the body parameters that their mass scales give."""
-        if starts.heaviness is None:
+        if starts.mass_scale is None:
             return starts
-        one, heavier = self.plant.parameters, self.plant.heavier
-        every = jax.vmap(lambda factors: heavier(one, factors))
-        return dataclasses.replace(starts, numbers=every(starts.heaviness))
+        one, with_mass_scale = self.plant.parameters, self.plant.with_mass_scale
+        every = jax.vmap(lambda factors: with_mass_scale(one, factors))
+        return dataclasses.replace(starts, numbers=every(starts.mass_scale))
 
-    def simulator(self, numbers: Numbers | None = None) -> Simulator:
+    def simulator(self, numbers: BodyParams | None = None) -> Simulator:
         """Return the simulator of the creature, or of the body with these parameters."""
         if numbers is None:
             ends = what_ends(self.creature, self.config.rollout)
@@ -195,28 +195,28 @@ class Blueprint:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class GrownBlueprint:
-    """See `Plan`; every genome grows its own body. creature: gives settings and time step only."""
+class GrownSpec:
+    """See `SimulatorSpec`; every genome grows its own body. creature: gives settings and time step only."""
 
     creature: Creature
     config: Config
 
     @property
     def numbers(self) -> None:
-        """See `Plan`."""
+        """See `SimulatorSpec`."""
         return None
 
     @functools.cached_property
     def own(self) -> Simulator:
-        """See `Plan`."""
+        """See `SimulatorSpec`."""
         return self.simulator()
 
     def embodied(self, starts: Starts) -> Starts:
-        """See `Plan`."""
+        """See `SimulatorSpec`."""
         return starts
 
-    def simulator(self, numbers: Numbers | None = None) -> Simulator:
-        """See `Plan`."""
+    def simulator(self, numbers: BodyParams | None = None) -> Simulator:
+        """See `SimulatorSpec`."""
         config, step = self.config, float(self.creature.model.opt.timestep)
         settings: Any = config.controller
         capacity = capacity_of(settings)
@@ -253,7 +253,7 @@ def _assembled(
     Raises:
       UserError: the controller reads an observation that the body does not have.
     """
-    check_senses(controller.reads, task.adds)
+    check_observations(controller.reads, task.adds)
     return Simulator(
         creature=body,
         plant=plant,
@@ -267,7 +267,7 @@ def _assembled(
     )
 
 
-def draw_up(creature: Creature, config: Config) -> Plan:
+def make_spec(creature: Creature, config: Config) -> SimulatorSpec:
     """Return the simulator specification of a run.
 
     Raises:
@@ -276,22 +276,22 @@ def draw_up(creature: Creature, config: Config) -> Plan:
     """
     check_fit(creature, config)
     if creature.settings.creature.grows:
-        return GrownBlueprint(creature, config)
+        return GrownSpec(creature, config)
     return _of_model(creature, config)
 
 
-def check_plan(creature: Creature, config: Config) -> None:
+def check_spec(creature: Creature, config: Config) -> None:
     """Refuse settings that give no program. Compiles and writes nothing.
 
     Raises:
-      UserError: see `draw_up`; or the controller reads an observation that the body does not have.
+      UserError: see `make_spec`; or the controller reads an observation that the body does not have.
     """
-    draw_up(creature, config).simulator()
+    make_spec(creature, config).simulator()
 
 
-def _of_model(creature: Creature, config: Config) -> Blueprint:
+def _of_model(creature: Creature, config: Config) -> ModelSpec:
     creature = creature.spanned(config.evolution.pose_span)
     touch = what_ends(creature, config.rollout).touch
     inputs = config.rollout.body == "inputs"
     plant, lanes = make_plant(creature, config.rollout.physics, touch, roomy=inputs)
-    return Blueprint(creature, config, plant, lanes, growth_of(creature, config))
+    return ModelSpec(creature, config, plant, lanes, growth_of(creature, config))

@@ -14,10 +14,10 @@ from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Config
 from mjxgait.creature import load_creature
 from mjxgait.plugins import resolve_config
-from mjxgait.training import prescreen as tryout
+from mjxgait.training import prescreen as prescreen
 from mjxgait.training.examination import Examiner, Exams
 from mjxgait.training.experiment import Experiment, build_experiment
-from mjxgait.training.prescreen import Tryout, tried_settings, tryout_of
+from mjxgait.training.prescreen import Prescreen, prescreen_of, tried_settings
 
 STARTS, MOST = 5, 3
 SECONDS = 0.1
@@ -25,7 +25,7 @@ SECONDS = 0.1
 
 def tried(tables: dict | None = None) -> Config:
     config = small_config(**(tables or {}))
-    examination = dataclasses.replace(config.examination, tryout=STARTS, candidates=MOST)
+    examination = dataclasses.replace(config.examination, prescreen=STARTS, candidates=MOST)
     return dataclasses.replace(config, examination=examination)
 
 
@@ -42,7 +42,7 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> None:
         long = tried_settings(config)
         return dataclasses.replace(long, rollout=dataclasses.replace(long.rollout, seconds=SECONDS))
 
-    monkeypatch.setattr(tryout, "tried_settings", shorter)
+    monkeypatch.setattr(prescreen, "tried_settings", shorter)
 
 
 def test_starts_are_as_far_disturbed_and_as_long_as_the_examiners():
@@ -60,7 +60,7 @@ def test_starts_are_as_far_disturbed_and_as_long_as_the_examiners():
 
 def test_starts_are_others_than_those_of_the_generations(experiment: Experiment, brief: None):
     """Even where both are disturbed alike: a prefix of the same draw would be no draw of its own."""
-    ours, others = experiment.starts, Tryout(experiment)._starts
+    ours, others = experiment.starts, Prescreen(experiment)._starts
     assert not np.isin(np.asarray(others.friction)[0, 1:], np.asarray(ours.friction)).any()
 
 
@@ -69,14 +69,14 @@ def test_trials_are_as_hard_as_they_become():
     luxo = load_creature(find_creature("luxo"))
     resolved = resolve_config(luxo.settings.train, "luxo", None, {"task": "limbo"})
     limbo = build_experiment(luxo, dataclasses.replace(resolved, examination=tried().examination))
-    assert np.asarray(Tryout(limbo)._starts.raised).tolist() == [[0.0] * (1 + STARTS)]
+    assert np.asarray(Prescreen(limbo)._starts.raised).tolist() == [[0.0] * (1 + STARTS)]
 
 
 def test_a_share_is_of_the_disturbed_starts_that_are_managed(
     experiment: Experiment, brief: None, monkeypatch: pytest.MonkeyPatch
 ):
     """Individual by individual as simulated alone; the nominal start is not among them."""
-    trying, state = Tryout(experiment), experiment.init()
+    trying, state = Prescreen(experiment), experiment.init()
     task = trying._trials.simulator.task
     ranks = [4, 0]
 
@@ -100,37 +100,37 @@ def test_a_share_is_of_the_disturbed_starts_that_are_managed(
 
     ways = np.array([alone(rank) for rank in ranks])
     middle = float(np.median(ways))
-    monkeypatch.setattr(Tryout, "_demands", AboveTheMedian)
+    monkeypatch.setattr(Prescreen, "_demands", AboveTheMedian)
     assert trying.shares(state, ranks).tolist() == (ways > middle).mean(1).tolist()
     assert np.ptp((ways > middle).mean(1)) > 0
-    ahead, compiled = Tryout(experiment), list[Tryout]()
+    ahead, compiled = Prescreen(experiment), list[Prescreen]()
 
-    def once(self: Tryout) -> jax.stages.Compiled:
+    def once(self: Prescreen) -> jax.stages.Compiled:
         """To compile once more would be the same."""
         compiled.append(self)
         return program
 
-    monkeypatch.setattr(Tryout, "_compile", once)
+    monkeypatch.setattr(Prescreen, "_compile", once)
     ahead.begin()
     assert ahead.shares(state, ranks).tolist() == trying.shares(state, ranks).tolist()
     assert compiled == [ahead]
 
 
 def test_the_margin_is_that_of_the_criterion_which_the_starts_decide(experiment: Experiment):
-    margin = Tryout(experiment).margin
+    margin = Prescreen(experiment).margin
     assert margin(0.9) == pytest.approx(0.0)
     assert margin(0.95) == pytest.approx(0.5)
     assert margin(0.8) < 0
 
 
 def test_there_is_none_unless_it_is_asked_for(experiment: Experiment):
-    def of(**settings: int) -> Tryout | None:
+    def of(**settings: int) -> Prescreen | None:
         examination = dataclasses.replace(experiment.config.examination, **settings)
         config = dataclasses.replace(experiment.config, examination=examination)
-        return tryout_of(dataclasses.replace(experiment, config=config))
+        return prescreen_of(dataclasses.replace(experiment, config=config))
 
     assert of() is not None
-    assert of(tryout=0) is None
+    assert of(prescreen=0) is None
     assert of(candidates=0) is None
 
 

@@ -20,8 +20,8 @@ from mjxgait.physics.batched_trees.tree import Surroundings
 from mjxgait.plugins.registry import build_config, find, resolve_config
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.modular.config import RoamConfig
-from mjxgait.training.blueprint import draw_up
 from mjxgait.training.folder import create_run
+from mjxgait.training.spec import make_spec
 
 
 class Smelling(Brains):
@@ -34,7 +34,7 @@ class Smelling(Brains):
 
 def simulator(controller: str, task: str = "swim") -> Simulator:
     use = {"controller": controller, "task": task}
-    return draw_up(load_creature("blocks"), build_config({"use": use}, "test")).simulator()
+    return make_spec(load_creature("blocks"), build_config({"use": use}, "test")).simulator()
 
 
 def test_a_brain_reads_only_what_there_is_to_sense():
@@ -62,7 +62,7 @@ def test_a_shorter_step_makes_harder_ground():
     seed = at_step(load_creature("blocks"), 0.005)
     use = {"controller": "brain", "task": "jump"}
     config = build_config({"use": use, "rollout": {"step": 0.005}}, "test")
-    plant: Any = draw_up(seed, config).simulator().plant
+    plant: Any = make_spec(seed, config).simulator().plant
     assert (plant.around.step, plant.around.contact) == (0.005, 0.01)
     assert at_step(seed, 0.0) is seed
 
@@ -162,7 +162,7 @@ def test_who_does_not_fit_is_refused_in_one_sentence(
 ):
     creature, config = load_creature(env), build_config(given, "test")
     for asked in (
-        lambda: draw_up(creature, config),
+        lambda: make_spec(creature, config),
         lambda: create_run(tmp_path, creature, config),
     ):
         with pytest.raises(UserError, match=f"{env}: .*{said}"):
