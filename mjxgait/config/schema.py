@@ -165,7 +165,7 @@ class ExaminationConfig:
     attempts: Annotated[Count, HOST] = 3
     candidates: Annotated[Whole, HOST] = 12
     on_the_way: Annotated[Count, HOST] = 1
-    prescreen: Annotated[Whole, HOST] = 0
+    tryout: Annotated[Whole, HOST] = 0
     difference: Annotated[NonNegative, HOST] = 0.02
     level: Annotated[Literal["walks", "anywhere"], HOST] = "walks"
 

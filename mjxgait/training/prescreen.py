@@ -31,7 +31,7 @@ def tried_settings(config: Config) -> Config:
     exam = CertificateConfig()
     rollout = dataclasses.replace(
         config.rollout,
-        starts=1 + config.examination.prescreen,
+        starts=1 + config.examination.tryout,
         seconds=exam.seconds,
         variety=1,
         joint_noise=exam.starts.joints,
@@ -119,4 +119,4 @@ class Prescreen:
 def prescreen_of(experiment: Experiment) -> Prescreen | None:
     """Return the pre-screening of a run; None if its settings disable it."""
     settings = experiment.config.examination
-    return Prescreen(experiment) if settings.prescreen and settings.candidates else None
+    return Prescreen(experiment) if settings.tryout and settings.candidates else None
