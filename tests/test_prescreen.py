@@ -25,7 +25,7 @@ SECONDS = 0.1
 
 def tried(tables: dict | None = None) -> Config:
     config = small_config(**(tables or {}))
-    examination = dataclasses.replace(config.examination, prescreen=STARTS, candidates=MOST)
+    examination = dataclasses.replace(config.examination, tryout=STARTS, candidates=MOST)
     return dataclasses.replace(config, examination=examination)
 
 
@@ -130,7 +130,7 @@ def test_there_is_none_unless_it_is_asked_for(experiment: Experiment):
         return prescreen_of(dataclasses.replace(experiment, config=config))
 
     assert of() is not None
-    assert of(prescreen=0) is None
+    assert of(tryout=0) is None
     assert of(candidates=0) is None
 
 
