@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from viewing.made_up import metrics_line
+from rendering.made_up import metrics_line
 
 from mjxgait.distributed.jobs import Advanced, AdvanceRows
 from mjxgait.distributed.recipe import Programs, Recipe

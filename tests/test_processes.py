@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from viewing.made_up import treading, write_run
+from rendering.made_up import treading, write_run
 
 from mjxgait.bench.scaling import Point, measure
 from mjxgait.creature import Creature

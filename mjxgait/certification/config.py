@@ -220,7 +220,7 @@ class CertificateConfig:
     gait: GaitConfig = dataclasses.field(default_factory=GaitConfig)
     physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
     parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
-    targets: TargetsConfig = dataclasses.field(default_factory=TargetsConfig)
+    wishes: TargetsConfig = dataclasses.field(default_factory=TargetsConfig)
     hop: HopConfig = dataclasses.field(default_factory=HopConfig)
     limbo: LimboConfig = dataclasses.field(default_factory=LimboConfig)
     travel: TravelConfig = dataclasses.field(default_factory=TravelConfig)

@@ -29,9 +29,9 @@ CLOSE = 0.05
 MOST_PAIRS = 256
 """Largest number of measured pairs of bars."""
 
-BodyParams = Any
+Numbers = Any
 """np.ndarray | jax.Array"""
-Vector = tuple[BodyParams, BodyParams, BodyParams]
+Vector = tuple[Numbers, Numbers, Numbers]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -68,8 +68,8 @@ class Crossings:
 
 
 def bar_distance(
-    apart: Vector, first: Vector, second: Vector, lengths: tuple[BodyParams, BodyParams]
-) -> BodyParams:
+    apart: Vector, first: Vector, second: Vector, lengths: tuple[Numbers, Numbers]
+) -> Numbers:
     """Distance of two segments in m, elementwise, of NumPy or JAX arrays.
 
     Ericson 2005, "Real-Time Collision Detection", section 5.1.9.
@@ -286,5 +286,5 @@ def _parts(rows: np.ndarray) -> Vector:
     return rows[0], rows[1], rows[2]
 
 
-def _dot(a: Sequence[BodyParams], b: Sequence[BodyParams]) -> BodyParams:
+def _dot(a: Sequence[Numbers], b: Sequence[Numbers]) -> Numbers:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

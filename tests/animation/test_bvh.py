@@ -5,7 +5,7 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
-from viewing.made_up import treading
+from rendering.made_up import treading
 
 from mjxgait.animation.clips.read_text import POSITION, read_bvh, rig_of_bvh
 from mjxgait.animation.export import WalkLoop, build_bvh, walk_loop

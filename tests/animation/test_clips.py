@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pygltflib as gltf
 import pytest
-from viewing.made_up import treading
+from rendering.made_up import treading
 
 from mjxgait.animation.export import (
     WalkLoop,

@@ -6,7 +6,7 @@ import numpy as np
 import pygltflib as gltf
 import pytest
 from animation.test_glb import read
-from viewing.made_up import treading
+from rendering.made_up import treading
 
 from mjxgait.animation.export import build_glb, walk_loop
 from mjxgait.rendering.walk import record_walk

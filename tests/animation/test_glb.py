@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pygltflib as gltf
 import pytest
-from viewing.made_up import treading
+from rendering.made_up import treading
 
 from mjxgait.animation.export import RATES, build_glb, walk_loop
 from mjxgait.animation.export.skeleton import gltf_axes, resting

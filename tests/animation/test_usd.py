@@ -5,7 +5,7 @@ import sys
 import mujoco
 import numpy as np
 import pytest
-from viewing.made_up import treading
+from rendering.made_up import treading
 
 from mjxgait.animation.export import walk_loop
 from mjxgait.animation.export.skeleton import gltf_axes, skeleton_of

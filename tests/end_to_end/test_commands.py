@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from animation.keys.made import columns, swings
 from end_to_end.shipped import CONFIGS, CREATURES, ROOT
 from end_to_end.walks import short_examination, small_settings, trained, walker
 from helpers import STOOL, said_by
-from keys.made import columns, swings
 
 from mjxgait.certification import read_certificate
 from mjxgait.cli import COMMANDS
@@ -20,7 +20,7 @@ ELSEWHERE = {
     "train": "tests/end_to_end/test_trainings.py::test_a_training_ends_with_a_certificate",
     "ablate": "tests/end_to_end/test_studies.py::test_a_study_ends_with_its_report",
     "bench": "tests/bench/test_bench.py::test_the_command_writes_the_ratios",
-    "view": "tests/viewing/test_live.py",
+    "view": "tests/web/test_live.py",
 }
 """Subcommands that have tests of their own, and where."""
 

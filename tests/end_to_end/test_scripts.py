@@ -25,14 +25,14 @@ from mjxgait.training import (
 from mjxgait.training import examination as looks
 
 BLENDER = "needs Blender as a module of Python"
-RAY = "needs Ray; tests/cluster/test_ray.py runs what it measures, where Ray is installed"
+RAY = "needs Ray; tests/distributed/test_ray.py runs what it measures, where Ray is installed"
 ELSEWHERE = {
     "in_blender.py": BLENDER,
     "rig_of_blender.py": BLENDER,
     "blender.py": BLENDER,
     "cluster.py": RAY,
     "cluster_faults.py": RAY,
-    "fuzz_readers.py": "needs atheris; tests/keys/test_hostile_keys.py and tests/importing/test_fuzz.py change files too",
+    "fuzz_readers.py": "needs atheris; tests/animation/keys/test_hostile_keys.py and tests/importer/test_fuzz.py change files too",
     "plant_faults.py": "tests/test_faults.py runs it on a tree of its own",
 }
 """What is not run here, and why."""

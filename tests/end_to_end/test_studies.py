@@ -39,7 +39,7 @@ def shrunk(name: str) -> dict:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_ends_with_its_report(name: str, tmp_path: Path, capsys: pytest.CaptureFixture):
-    """With `--thorough` every study is evolved; tests/ablation evolves one."""
+    """With `--thorough` every study is evolved; tests/experiments/ablation evolves one."""
     file, out = tmp_path / f"{name}.toml", tmp_path / "out"
     file.write_text(tomli_w.dumps(shrunk(name)))
     rows = ("--rows", SEEDS) if name == "null" else ()

@@ -46,13 +46,13 @@ from mjxgait.training.folder import (
 
 WAYS = list(trainings())
 TRAINED = {
-    "walk": "tests/test_run.py",
-    "hop": "tests/test_hop.py",
-    "limbo": "tests/test_limbo.py",
-    "swim": "tests/blocks/test_swimming.py",
-    "follow-on-land": "tests/blocks/test_roaming.py",
-    **dict.fromkeys(("jump", "follow"), "tests/blocks/test_roaming.py"),
-    "travel": "tests/test_travel.py",
+    "walk": "tests/training/test_run.py",
+    "hop": "tests/tasks/hop/test_hop.py",
+    "limbo": "tests/tasks/hop/test_limbo.py",
+    "swim": "tests/tasks/modular/test_swimming.py",
+    "follow-on-land": "tests/tasks/modular/test_roaming.py",
+    **dict.fromkeys(("jump", "follow"), "tests/tasks/modular/test_roaming.py"),
+    "travel": "tests/tasks/hop/test_travel.py",
 }
 """Tasks that another test evolves, and where. Of those of test_roaming.py it evaluates individuals on
 land, and compares parts of the others with the examiner; `--thorough` evolves them.
@@ -187,5 +187,5 @@ VARIANTS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VARIANTS)
 def test_what_changes_the_body_ends_with_a_certificate(name: str, tmp_path: Path, capsys):
-    """With `--thorough` it evolves; tests/test_mjx.py and tests/test_evolve_body.py always do."""
+    """With `--thorough` it evolves; tests/physics/test_mjx.py and tests/training/test_evolve_body.py always do."""
     train(capsys, tmp_path / "run", "--env", str(STOOL), *VARIANTS[name])

@@ -10,7 +10,7 @@ from pathlib import Path
 import tomli_w
 from end_to_end.shipped import TINY
 from helpers import SHORT, STOOL
-from viewing.made_up import falling, treading
+from rendering.made_up import falling, treading
 
 from mjxgait.champion import write_champion
 from mjxgait.cli import main

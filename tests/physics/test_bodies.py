@@ -188,7 +188,7 @@ def test_none_is_the_plants_own(
         close(np.asarray(a), np.asarray(b), 2e-5 * tight)
 
 
-@pytest.mark.thorough("tests/test_inputs.py compares the programs of whole runs")
+@pytest.mark.thorough("tests/training/test_inputs.py compares the programs of whole runs")
 def test_numbers_as_inputs_leave_one_program(plant: Plant, numbers: list[Any], moment: Moment):
     def text(parameters: Any) -> str:
         def program(parameters: Any, *arguments: Any) -> Any:

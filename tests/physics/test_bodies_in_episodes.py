@@ -38,7 +38,7 @@ class BodyPerStart(Simulator):
 
 
 pytestmark = pytest.mark.thorough(
-    "tests/test_evolve_body.py and tests/blocks/test_swimming.py compare episodes of bodies that "
+    "tests/training/test_evolve_body.py and tests/tasks/modular/test_swimming.py compare episodes of bodies that "
     "differ with C MuJoCo, and test_bodies.py compares their steps"
 )
 

@@ -214,7 +214,7 @@ def commanded_headings(
 
 def _as_told(creature: Creature, outcome: Outcome, speed: float) -> np.ndarray:
     """Return [S] for the last seconds: speed by chords of a second, and the mean heading."""
-    limits, film = CertificateConfig().targets, outcome.trajectory
+    limits, film = CertificateConfig().wishes, outcome.trajectory
     watched, second = round(WATCHED / film.time_step), round(1.0 / film.time_step)
     root = creature.root_qpos
     place = film.qpos[:, -watched:, root : root + 2]

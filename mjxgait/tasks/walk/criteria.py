@@ -96,13 +96,13 @@ class WalkCriteria(StaysUp):
     ) -> np.ndarray | None:
         if "steer" not in self.wish:
             return None
-        return draw_commands(self.wish["steer"], config.targets.commands, steps, time_step, rng)
+        return draw_commands(self.wish["steer"], config.wishes.commands, steps, time_step, rng)
 
     def obeyed(
         self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """See `AcceptanceCriteria`: 11."""
-        return (steered(outcome, commanded, config.targets),)
+        return (steered(outcome, commanded, config.wishes),)
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig

@@ -119,7 +119,7 @@ def unrolled(recording: Recording, wish: Wish) -> Recording:
 
 def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criterion:
     """10. The walk meets its targets. window: unrolled, after the warm-up."""
-    limits = config.targets
+    limits = config.wishes
     found = posture(window) | likeness(window, config.gait.clearance)
     measures: list[Measure] = []
     if "speed" in wish:
