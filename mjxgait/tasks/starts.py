@@ -1,6 +1,7 @@
 """Initial conditions of the trials, shared by all individuals: first nominal, others perturbed."""
 
 import dataclasses
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -33,10 +34,8 @@ class Starts:
       are 1.
     numbers: leaves [R, ...], the body parameters that follow from it, as the plant reads them.
     ground: leaves [R, ...], one per trial; None if all are flat.
-    goal: [R] m ahead of the start; None if the task has none.
-    raised: [R] m by which a bar is above its final height; None without a bar.
-    light: [R, 3] m from where the root starts; None without a light.
-    turn: [R] rad/s, rate of the commanded heading; None without a command.
+    goal: leaves [R, ...], what the task adds to a trial, as its `Task.goal` reads it; None if it
+      adds nothing.
     delay: [R] control steps by which torques are late; None if they never are.
     """
 
@@ -50,10 +49,7 @@ class Starts:
     ground: Ground | None = None
     mass_scale: jax.Array | None = None
     numbers: object = None
-    goal: jax.Array | None = None
-    raised: jax.Array | None = None
-    light: jax.Array | None = None
-    turn: jax.Array | None = None
+    goal: Any = None
     delay: jax.Array | None = None
 
 

@@ -69,7 +69,7 @@ def test_trials_are_as_hard_as_they_become():
     luxo = load_creature(find_creature("luxo"))
     resolved = resolve_config(luxo.settings.train, "luxo", None, {"task": "limbo"})
     limbo = build_experiment(luxo, dataclasses.replace(resolved, examination=tried().examination))
-    assert np.asarray(Prescreen(limbo)._starts.raised).tolist() == [[0.0] * (1 + STARTS)]
+    assert np.asarray(Prescreen(limbo)._starts.goal.raised).tolist() == [[0.0] * (1 + STARTS)]
 
 
 def test_a_share_is_of_the_disturbed_starts_that_are_managed(

@@ -113,7 +113,7 @@ class Limbo(Hop):
         if not parse_ground(settings.ground).flat:
             raise UserError(f"rollout.ground = {settings.ground}: task limbo needs flat ground")
         starts = super().trials(key, creature, settings)
-        return dataclasses.replace(starts, raised=jnp.zeros(settings.starts))
+        return dataclasses.replace(starts, goal=Goal(starts.goal, jnp.zeros(settings.starts)))
 
     @override
     def levels(self, settings: LimboConfig) -> jax.Array | int:
@@ -124,7 +124,7 @@ class Limbo(Hop):
         """See `Task`: the bar comes down, so that hoppers learn to duck little by little."""
         left = 1.0 - ramped(settings.lowering, level)
         raised = jnp.full(trials.friction.shape, settings.higher * left)
-        return dataclasses.replace(trials, raised=raised)
+        return dataclasses.replace(trials, goal=Goal(trials.goal.ahead, raised))
 
     def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """See `Task`: at the goal in the end, and hardly in the bar."""
@@ -132,7 +132,7 @@ class Limbo(Hop):
 
     @override
     def goal(self, trial: Starts) -> Any:
-        return Goal(super().goal(trial), jnp.asarray(trial.raised))
+        return jax.tree.map(jnp.asarray, trial.goal)
 
     @override
     def params(self, settings: Any) -> TaskParams:

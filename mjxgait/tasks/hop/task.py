@@ -72,7 +72,7 @@ class Hop(PlainTask):
         return self.settings.sub_goals if "sub_goals" in self.terms else ()
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the usual starts, each with a goal of its own; the first is nominal."""
+        """See `Task`: the usual starts, each with its goal [] in m ahead; the first is nominal."""
         starts = draw_starts(key, creature, settings)
         low, high = self.goals
         # A separate key keeps the starts the same as those of every other task.

@@ -42,12 +42,11 @@ class Following(GoingTask):
         keys = jax.random.split(jax.random.fold_in(key, 6), rounds)
         drawn = jax.vmap(lambda key: balanced(key, others, self.axes))(keys)
         lights = LIGHT * jnp.vstack([jnp.array([[1.0, 0.0, 0.0]]), drawn.reshape(-1, 3)])
-        return dataclasses.replace(super().trials(key, creature, settings), light=lights)
+        return dataclasses.replace(super().trials(key, creature, settings), goal=lights)
 
     def goal(self, trial: Starts) -> jax.Array:
-        """See `Task`: place [3] of the light in m."""
-        assert trial.light is not None
-        return trial.qpos[:3] + trial.light
+        """See `Task`: place [3] of the light in m; the trial has it from where the root starts."""
+        return jnp.asarray(trial.qpos[:3] + trial.goal)
 
     def observations(self, goal: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
         """See `Task`: direction [G, 3] of the light in the axes of each block."""

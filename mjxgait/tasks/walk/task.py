@@ -142,7 +142,8 @@ class TargetedWalk(Walk):
         return (*super().terms, *target_weights(self.wish))
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the usual initial conditions, and the rate of the commanded turn.
+        """See `Task`: the usual initial conditions, and the rate [R] of the commanded turn in
+        rad/s.
 
         With `turn`, all have the target rate. With `steer`, the first goes straight; the others
         turn left and right alternately, at half the target rate at least.
@@ -156,13 +157,13 @@ class TargetedWalk(Walk):
             rate = self.wish.steer * side * drawn
         else:
             return starts
-        return dataclasses.replace(starts, turn=jnp.radians(rate))
+        return dataclasses.replace(starts, goal=jnp.radians(rate))
 
     def goal(self, trial: Starts) -> Heading:
         """See `Task`: the commanded heading [] in rad, and its change per step."""
-        if trial.turn is None:
+        if trial.goal is None:
             return ()
-        return jnp.zeros(()), trial.turn * self.step
+        return jnp.zeros(()), trial.goal * self.step
 
     @override
     def next_goal(self, goal: Heading, sensed: Sensed) -> Heading:

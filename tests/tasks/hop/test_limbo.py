@@ -213,7 +213,7 @@ def test_the_bar_comes_down_in_so_many_steps_and_stays(stool: Creature):
     assert state.level == 0
 
     def raised(row: RunParams, level: int) -> np.ndarray:
-        return np.asarray(next_starts(task, row, at(state, level=level)).raised)
+        return np.asarray(next_starts(task, row, at(state, level=level)).goal.raised)
 
     for level, expected in ((0, 0.1), (1, 0.09), (5, 0.05), (10, 0.0), (50, 0.0)):
         assert raised(rows[0].row, level) == pytest.approx([expected] * 3, abs=1e-6)
@@ -266,7 +266,7 @@ def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
 
 def test_all_goals_lie_beyond_the_bar(luxo: Creature):
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
-    goals = np.asarray(task.trials(key_of(0), luxo, RolloutConfig(starts=100)).goal)
+    goals = np.asarray(task.trials(key_of(0), luxo, RolloutConfig(starts=100)).goal.ahead)
     assert goals[0] == np.float32(evolution.LIMBO_NOMINAL_GOAL)
     assert goals.min() > BAR_PLACE + luxo.frame.body_length
     with pytest.raises(UserError, match=r"slope:0.1.*flat"):

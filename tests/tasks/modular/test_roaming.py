@@ -259,7 +259,7 @@ def test_lights_are_balanced_and_others_in_each_round(task: Roam, follower: type
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rounds = 200
     rollout = RolloutConfig(starts=1 + others * rounds, variety=rounds)
-    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).light) / LIGHT
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
     np.testing.assert_allclose(np.linalg.norm(lights, axis=1), 1.0, rtol=1e-5)
     assert lights[0] == pytest.approx([1, 0, 0])
     drawn = lights[1:].reshape(rounds, others, 3)
@@ -276,7 +276,7 @@ def test_lights_are_balanced_and_others_in_each_round(task: Roam, follower: type
 def test_many_lights_are_all_around(task: Roam, follower: type):
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=200)
-    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).light) / LIGHT
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
     spread = (lights**2).mean(0)
     np.testing.assert_allclose(spread[: following.axes], 1 / following.axes, atol=0.1)
 
@@ -284,7 +284,7 @@ def test_many_lights_are_all_around(task: Roam, follower: type):
 def test_in_water_lights_are_at_the_corners_of_solids_and_at_crosses(task: Roam):
     following = FollowInWater(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=1 + 3 * 100, variety=100)
-    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).light) / LIGHT
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
     cosines = [np.sort(np.r_[1, one[:, 0]]) for one in lights[1:].reshape(100, 3, 3)]
     solid, cross = ([-1 / 3] * 3 + [1], [-1, 0, 0, 1])
     solids = sum(bool(np.allclose(found, solid, atol=1e-5)) for found in cosines)

@@ -325,7 +325,7 @@ def test_who_turns_is_told_a_heading_that_turns(body: Creature):
 def test_who_is_steered_goes_straight_once_and_to_both_sides(body: Creature):
     task = asked(config_of(steer=40.0), body)
     rollout = dataclasses.replace(small_config().rollout, starts=5)
-    turn = np.degrees(task.trials(key_of(0), body, rollout).turn)
+    turn = np.degrees(task.trials(key_of(0), body, rollout).goal)
     assert turn[0] == 0.0
     assert np.sign(turn[1:]).tolist() == [1.0, -1.0, 1.0, -1.0]
     assert ((abs(turn[1:]) >= 20.0) & (abs(turn[1:]) <= 40.0)).all()
@@ -350,7 +350,7 @@ def test_speeds_and_turns_share_a_program_and_gaits_do_not():
 def test_rows_of_one_program_are_told_to_turn_each_at_its_own_rate(stool: Creature):
     configs = [small_config(fitness={"wish": {"speed": SPEED, "turn": t}}) for t in (10.0, -30.0)]
     for one, rate in zip(build_batch(stool, configs).experiments, (10.0, -30.0), strict=True):
-        np.testing.assert_allclose(np.degrees(one.starts.turn), rate, rtol=1e-6)
+        np.testing.assert_allclose(np.degrees(one.starts.goal), rate, rtol=1e-6)
 
 
 def test_none_can_be_told_to_turn_and_be_steered():
