@@ -58,16 +58,7 @@ class Sensed:
     geom_pos: [G, 3] m, centres of the watched geoms. geom_low: [G] m, height of their lowest points
     above the ground under them.
     floor: [] m, height of the ground under the trunk; None where it is the plane z = 0.
-
-    The rest is for modular bodies; None for bodies of a model.
-    middle: [3] m, centre of all mass.
-    momentum: [3] kg·m/s, total.
-    washed: [3] N, total force of the water, 0 where there is none.
-    past: [] rad, largest excess of a hinge beyond its range.
-    sunk: [] depth of the deepest block in the ground, in units of the block's size (the cube root
-    of its volume); negative where all are above.
-    geom_rot: [G, 3, 3], rows are the own axes of each watched block in the world; only where vision
-    needs it.
+    body: a pytree of what only the plant's kind of bodies has; None for bodies of a model.
     """
 
     joint_pos: jax.Array
@@ -80,12 +71,7 @@ class Sensed:
     geom_pos: jax.Array
     geom_low: jax.Array
     floor: jax.Array | None = None
-    middle: jax.Array | None = None
-    momentum: jax.Array | None = None
-    washed: jax.Array | None = None
-    past: jax.Array | None = None
-    sunk: jax.Array | None = None
-    geom_rot: jax.Array | None = None
+    body: Any = None
 
 
 @pytree

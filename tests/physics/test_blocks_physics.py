@@ -205,7 +205,7 @@ def test_bodies_rest_on_the_ground(graphs: Graph, bodies: Body):
         state = dataclasses.replace(moments(bodies, 0.0), qpos=jnp.asarray(low.T))
         sensed, _ = looked_at(state)
         np.testing.assert_allclose(np.asarray(sensed.geom_low).min(0), 0.0, atol=1e-6)
-        np.testing.assert_allclose(sensed.sunk, 0.0, atol=1e-4)
+        np.testing.assert_allclose(sensed.body.depth, 0.0, atol=1e-4)
     low = np.asarray(rested(bodies.tree, straight))
     for lane in range(LANES):
         model = model_of(one(graphs, lane), ON_LAND)
@@ -224,14 +224,14 @@ def test_who_is_deepest_in_the_ground_is_told_in_its_size(bodies: Body):
         size = np.cbrt(8 * tree.half.prod(1))
         there = tree.solid > 0
         deepest = (-sensed.geom_low[:, lane] / size)[there].max()
-        assert sensed.sunk[lane] == pytest.approx(deepest, rel=1e-4, abs=1e-6)
+        assert sensed.body.depth[lane] == pytest.approx(deepest, rel=1e-4, abs=1e-6)
 
 
 def test_the_light_is_seen_in_each_blocks_own_axes(graphs: Graph, bodies: Body):
     state, place = moments(bodies, 0.3), np.array([3.0, -4.0, 1.0])
     sensed, _ = looked_at(state)
     nobody: Any = None
-    look = jax.vmap(partial(Following.senses, nobody, jnp.float32(place)), in_axes=-1)
+    look = jax.vmap(partial(Following.observations, nobody, jnp.float32(place)), in_axes=-1)
     seen = np.asarray(jax.jit(look)(sensed)["light"])
     for lane in range(LANES):
         body = one(bodies, lane)

@@ -16,7 +16,7 @@ from typing_extensions import override
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.controllers.sims_brain.reference_body import LIGHT
 from mjxgait.creature import Creature
-from mjxgait.tasks.modular.task import GoingTask, Roam, Swim, length
+from mjxgait.tasks.modular.task import GoingTask, Roam, Swim, length, own
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed
 
@@ -50,10 +50,11 @@ class Following(GoingTask):
 
     def observations(self, goal: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
         """See `Task`: direction [G, 3] of the light in the axes of each block."""
-        assert sensed.geom_rot is not None
+        axes = own(sensed).geom_rot
+        assert axes is not None
         there = goal - sensed.geom_pos
         there = there / jnp.sqrt(jnp.sum(there**2, axis=1, keepdims=True))
-        return {"light": jnp.sum(sensed.geom_rot * there[:, None], axis=2)}
+        return {"light": jnp.sum(axes * there[:, None], axis=2)}
 
     @override
     def update(

@@ -18,6 +18,7 @@ from typing_extensions import override
 
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
+from mjxgait.physics.batched_trees.tree import ModularSensed
 from mjxgait.tasks import base as protocol
 from mjxgait.tasks.base import FINISHED, ramp
 from mjxgait.tasks.modular.config import (
@@ -37,6 +38,12 @@ WILD = 1
 """Reason for an early end: faster than anything alive, or bent past the range of a joint."""
 FASTEST_HINGE, FASTEST, FURTHEST = 20.0, 5.0, 0.08
 """rad/s, m/s, rad past a hinge's range."""
+
+
+def own(sensed: Sensed) -> ModularSensed:
+    """Return the quantities that only modular bodies have."""
+    assert isinstance(sensed.body, ModularSensed)
+    return sensed.body
 
 
 @pytree
@@ -81,8 +88,7 @@ class BlocksTask(PlainTask):
     def ended(self, sensed: Sensed, goal: object) -> jax.Array:
         speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
         wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
-        assert sensed.past is not None
-        return jnp.where(wild | (sensed.past > FURTHEST), WILD, FINISHED)
+        return jnp.where(wild | (own(sensed).limit_excess > FURTHEST), WILD, FINISHED)
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
         """See `Task`: the first term is a reward, all others are penalties.
@@ -127,12 +133,11 @@ class GoingTask(BlocksTask):
         self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> Any:
         """See `Task`: the place now, and when counting began."""
-        assert sensed.middle is not None
         return dataclasses.replace(
             stats,
             steps=stats.steps + 1,
-            settled=jnp.where(stats.steps <= params, sensed.middle, stats.settled),
-            place=sensed.middle,
+            settled=jnp.where(stats.steps <= params, own(sensed).com, stats.settled),
+            place=own(sensed).com,
         )
 
     def speed(self, stats: EpisodeStats, settings: BlocksConfig) -> jax.Array:
@@ -190,12 +195,10 @@ class Swim(GoingTask):
     def update(
         self, stats: SwimStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> SwimStats:
-        assert sensed.momentum is not None
-        assert sensed.washed is not None
         begins, momentum, push = (
             stats.steps <= params,
-            sensed.momentum,
-            sensed.washed * self.step,
+            own(sensed).momentum,
+            own(sensed).water_force * self.step,
         )
         began = jnp.where(begins, momentum, stats.began)
         given = jnp.where(begins, 0.0, stats.given)
@@ -247,13 +250,12 @@ class Roam(GoingTask):
     def update(
         self, stats: RoamStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> RoamStats:
-        assert sensed.sunk is not None
         begins = stats.steps <= params
         upwards = jnp.where(begins, sensed.trunk_rot[2], stats.upwards)
         upright = jnp.sum(sensed.trunk_rot[2] * upwards)
         return dataclasses.replace(
             super().update(stats, sensed, torque, params, goal),
-            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, sensed.sunk)),
+            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, own(sensed).depth)),
             upwards=upwards,
             upright=jnp.where(begins, 1.0, jnp.minimum(stats.upright, upright)),
         )
@@ -310,14 +312,13 @@ class Jump(BlocksTask):
     def update(
         self, stats: JumpStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: object
     ) -> JumpStats:
-        assert sensed.sunk is not None
         begins, low = stats.steps <= params, jnp.min(sensed.geom_low)
         span = SPANS * (stats.steps - params) // jnp.maximum(self.horizon - params, 1)
         now = (jnp.arange(SPANS) == span) & ~begins
         return dataclasses.replace(
             stats,
             steps=stats.steps + 1,
-            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, sensed.sunk)),
+            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, own(sensed).depth)),
             heights=jnp.where(now, jnp.maximum(stats.heights, low), stats.heights),
         )
 

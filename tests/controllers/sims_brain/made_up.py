@@ -15,6 +15,7 @@ from mjxgait.controllers.sims_brain.genotype import (
 )
 from mjxgait.controllers.sims_brain.phenotype import Body, body_of
 from mjxgait.evolution.chance import key_of
+from mjxgait.physics.batched_trees.tree import ModularSensed
 from mjxgait.types import Sensed
 
 CAPACITY, LANES = Capacity(), 96
@@ -54,10 +55,17 @@ CALM = Sensed(
     trunk_angvel=jnp.zeros(3),
     geom_pos=jnp.zeros((4, 3)),
     geom_low=jnp.zeros(4),
-    middle=jnp.zeros(3),
-    momentum=jnp.zeros(3),
-    washed=jnp.zeros(3),
-    past=jnp.float32(0.01),
-    sunk=jnp.float32(-1.0),
+    body=ModularSensed(
+        com=jnp.zeros(3),
+        momentum=jnp.zeros(3),
+        water_force=jnp.zeros(3),
+        limit_excess=jnp.float32(0.01),
+        depth=jnp.float32(-1.0),
+    ),
 )
-"""A moment of one of three hinges and four blocks that does nothing."""
+"""Three hinges and four blocks at rest."""
+
+
+def moment(own: dict[str, Any] | None = None, **common: Any) -> Sensed:
+    """`CALM` with other values, `own` of those that only modular bodies have."""
+    return dataclasses.replace(CALM, body=dataclasses.replace(CALM.body, **own or {}), **common)

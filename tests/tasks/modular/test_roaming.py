@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from controllers.sims_brain.made_up import CALM
+from controllers.sims_brain.made_up import CALM, moment
 
 from mjxgait.api import load_creature
 from mjxgait.certification.acceptance import acceptance_of, promising
@@ -167,12 +167,11 @@ def evaluation(
         turned = jnp.array(
             [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
         )
-        sensed = dataclasses.replace(
-            CALM,
-            middle=jnp.array([0.0, task.step * k, 0.1 * k]),
-            trunk_rot=turned,
-            sunk=jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
-        )
+        own = {
+            "com": jnp.array([0.0, task.step * k, 0.1 * k]),
+            "depth": jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
+        }
+        sensed = moment(own, trunk_rot=turned)
         stats = task.update(stats, sensed, jnp.zeros(3), params, ())
     return {name: float(value) for name, value in task.evaluate(stats, settings).items()}
 
@@ -209,7 +208,7 @@ def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
         for k in range(task.horizon):
             low = CALM.geom_low.at[:].set(1.0).at[1].set(heights.get(k, 0.0))
             deep = jnp.float32(sunk if k == 100 else -1.0)
-            sensed = dataclasses.replace(CALM, geom_low=low, sunk=deep)
+            sensed = moment({"depth": deep}, geom_low=low)
             stats = jumping.update(stats, sensed, jnp.zeros(3), params, ())
         return {name: float(value) for name, value in jumping.evaluate(stats, settings).items()}
 
@@ -241,7 +240,7 @@ def test_to_follow_is_to_get_nearer_to_the_light(task: Roam, follower: type):
     for light, way in (([10.0, 0, 0], 2.0), ([-10.0, 0, 0], -2.0), ([0, 10.0, 0], -0.198)):
         stats, params = following.init(), following.params(settings)
         for k in (0, 1):
-            sensed = dataclasses.replace(CALM, middle=jnp.array([2.0 * k, 0.0, 0.0]))
+            sensed = moment({"com": jnp.array([2.0 * k, 0.0, 0.0])})
             stats = following.update(stats, sensed, jnp.zeros(3), params, jnp.array(light))
         assert float(following.way(stats)) == pytest.approx(way, abs=1e-3)
         evaluation = following.evaluate(

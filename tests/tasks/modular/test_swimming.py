@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from controllers.sims_brain.made_up import CALM
+from controllers.sims_brain.made_up import CALM, moment
 
 from mjxgait.api import load_creature
 from mjxgait.certification.trials import simulate
@@ -98,7 +98,7 @@ def test_what_is_faster_or_bent_further_than_anything_alive_ends(experiment: Exp
     task = experiment.simulator.task
     assert int(task.ended(CALM, ())) == 0
     wild = dataclasses.replace(CALM, joint_vel=CALM.joint_vel.at[2].set(FASTEST_HINGE + 1))
-    bent = dataclasses.replace(CALM, past=jnp.float32(FURTHEST + 0.01))
+    bent = moment({"limit_excess": jnp.float32(FURTHEST + 0.01)})
     assert [int(task.ended(each, ())) for each in (wild, bent)] == [1, 1]
 
 
@@ -111,9 +111,8 @@ def evaluation(task: Swim, given: float, overlap: float = 0.0) -> dict[str, floa
     for k in range(task.horizon):
         momentum = 1.0 + push / given * step * k
         along = jnp.array([1.0, 0.0, 0.0])
-        sensed = dataclasses.replace(
-            CALM, middle=place * along, momentum=momentum * along, washed=push * along
-        )
+        own = {"com": place * along, "momentum": momentum * along, "water_force": push * along}
+        sensed = moment(own)
         stats = task.update(stats, sensed, jnp.zeros(3), params, ())
         place += momentum / 2 * step
     stats = dataclasses.replace(stats, overlap=jnp.float32(overlap))
