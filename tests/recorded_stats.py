@@ -1,4 +1,4 @@
-"""What an examiner's recording means for the statistics, in NumPy: computed a second time."""
+"""Episode statistics of a recording, computed a second time in NumPy."""
 
 import mujoco
 import numpy as np
@@ -11,7 +11,7 @@ from mjxgait.tasks.walk.stats import CONTACT_GAP, SWING
 
 
 class Frames:
-    """A row of a recording, seen again by MuJoCo; frames are states before their torque acts.
+    """A row of a recording, replayed in MuJoCo; frames are states before their torque acts.
 
     trunk_pos: [T, 3] m. trunk_rot: [T, 3, 3]. spin: [T, 3] rad/s, world.
     low, place: [T, G], [T, G, 2] m, of the watched spheres and boxes.
@@ -46,7 +46,7 @@ class Frames:
 
 
 def lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
-    """m; of a sphere, or of a box by its corners."""
+    """Least height in m of a sphere, or of a box by its corners."""
     if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE:
         return float(data.geom_xpos[geom, 2] - model.geom_size[geom, 0])
     assert model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX
@@ -57,10 +57,10 @@ def lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
 
 
 def end(frames: Frames, fall: Termination | Fall | None = None) -> tuple[int, Reason]:
-    """The first frame that ends an episode, and why; the number of frames where none does."""
+    """First frame that ends an episode, and the reason; the number of frames if none does."""
     limits = fall or frames.creature.settings.termination
     height = frames.trunk_pos[:, 2] / frames.creature.frame.stand_height
-    # Where several hold, the one further down counts.
+    # If several hold, the last one counts.
     found = np.full(len(height), Reason.FINISHED)
     if limits.touch:
         found[frames.touch] = Reason.TOUCHED
@@ -72,9 +72,9 @@ def end(frames: Frames, fall: Termination | Fall | None = None) -> tuple[int, Re
 
 
 def stats_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[str, np.ndarray]:
-    """The statistics of the first `steps` frames by name, without `reason`; there must be a frame more.
+    """Statistics of the first `steps` frames by name, without `reason`; needs one frame more.
 
-    half: frame whose distance is that of half time. clearance: m wanted of each foot in each swing.
+    half: frame of the distance at half time. clearance: m, target of each foot in each swing.
     """
     creature, torque = frames.creature, frames.torque[:steps]
     joints, speeds = frames.joints[:steps], frames.speeds[:steps]
@@ -111,7 +111,7 @@ def stats_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[st
 
 
 def _swings(low: np.ndarray, rise: float, clearance: float) -> dict[str, np.ndarray]:
-    """Swings of each foot, from when it is above `rise` to when it is below half of it."""
+    """Swings of each foot, from above `rise` to below half of it."""
     count, shortfall, peak = np.zeros(4), np.zeros(4), np.zeros(4)
     swinging = np.zeros(4, bool)
     for foot, heights in enumerate(low.T):

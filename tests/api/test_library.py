@@ -1,4 +1,4 @@
-"""The program as a library: what the command line does, from Python."""
+"""The Python API: what the command line does, from Python."""
 
 import json
 import pydoc
@@ -23,7 +23,7 @@ SMALL = {
 
 @pytest.fixture(scope="module", autouse=True)
 def short() -> Iterator[None]:
-    """What is examined here is examined for 3 s: the whole takes ten times as long."""
+    """Examinations of 3 s; full ones take ten times as long."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mjxgait.certification.certificate.CertificateConfig", short_examination)
         yield
@@ -37,7 +37,7 @@ def run(tmp_path_factory) -> mjxgait.Run:
     )
 
 
-def test_a_run_is_its_folder(run: mjxgait.Run):
+def test_a_run_has_the_contents_of_its_folder(run: mjxgait.Run):
     assert (run.creature.name, run.config.seed, run.config.rollout.lanes) == ("stool", 3, 4)
     document = json.loads((run.folder / "champion.json").read_text())
     assert run.champion.fitness == document["fitness"]
@@ -49,7 +49,7 @@ def test_a_run_is_its_folder(run: mjxgait.Run):
 def test_a_second_run_of_the_same_shape_compiles_nothing(
     run: mjxgait.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Another seed and another weight are numbers; the first is what it would be alone."""
+    """Seed and weights are data of the program; the first run, repeated, gives the same result."""
 
     def compiled(*_: object) -> None:
         raise AssertionError("compiled anew")
@@ -65,7 +65,7 @@ def test_a_second_run_of_the_same_shape_compiles_nothing(
     assert again.champion.fitness == run.champion.fitness
 
 
-def test_another_body_or_shape_has_programs_of_its_own(stool: Creature):
+def test_another_body_or_shape_has_its_own_programs(stool: Creature):
     other = scaled(stool, {"*_left": 1.2})
     shapes = [
         build_experiment(body, small_config(**tables)).shape
@@ -94,12 +94,12 @@ def test_a_walk_is_columns_over_time(run: mjxgait.Run):
     assert np.allclose(np.diff(columns["time"]), run.creature.model.opt.timestep)
     feet, joints = run.creature.feet.names, run.creature.joints.names
     assert {f"force_{foot}" for foot in feet} | {f"torque_{j}" for j in joints} <= set(columns)
-    # It stands on its feet: together they bear about its weight.
+    # The feet together carry about its weight.
     force = sum(columns[f"force_{foot}"] for foot in feet)
     assert force.mean() == pytest.approx(9.81 * run.creature.frame.mass, rel=0.3)
 
 
-def test_the_examination_again_comes_to_the_same(run: mjxgait.Run, tmp_path: Path):
+def test_a_repeated_examination_gives_the_same_certificate(run: mjxgait.Run, tmp_path: Path):
     (tmp_path / "short.toml").write_text(SHORT)
     again = json.loads(mjxgait.examine(run, tmp_path / "short.toml").to_json())
     assert {**again, "seconds": 0} == {**run.certificate, "seconds": 0}
@@ -133,8 +133,8 @@ def test_a_mistake_is_one_sentence(call, words: str, tmp_path: Path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
-def test_help_is_a_good_read():
-    """What can be called stands in it, with what it takes, gives and refuses."""
+def test_help_covers_the_public_api():
+    """It lists all public names with their arguments, results and errors."""
     text = pydoc.plain(pydoc.render_doc(mjxgait))
     for name in mjxgait.__all__:
         assert name in text
@@ -148,7 +148,7 @@ FIRST = 'CREATURE, SETTINGS = "tall_quadruped", {}'
 
 
 def test_the_notebook_runs(tmp_path: Path, monkeypatch, capsys):
-    """Its cells in their order, on a small body and in little time."""
+    """All cells run in order, on a small body and for a short time."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -68,7 +68,7 @@ DRIVE = {field.name for field in dataclasses.fields(DriveConfig)}
 
 
 def make_champion(creature, key_poses=None, tuning=None, **settings):
-    """A champion that stands, unless poses say otherwise; settings of the controller or the drive."""
+    """Champion that stands by default. settings: of the controller or the drive."""
     poses = np.stack([creature.joints.stand] * 2) if key_poses is None else key_poses
     drive = {name: settings.pop(name) for name in DRIVE & settings.keys()}
     return pose_champion(
@@ -97,7 +97,7 @@ DOG = Dimensions(
 def walk(
     period=0.8, speed=0.8, duty=0.6, lift=0.05, phases=(0.0, 0.5, 0.5, 0.0), seconds=22.0
 ) -> Recording:
-    """A made-up steady walk of a dog without physics: every number is a plain function of the phase."""
+    """Steady walk of a dog without physics: every number is a function of the phase."""
     time_step = 0.005
     time = np.arange(round(seconds / time_step)) * time_step
     phase = time / period

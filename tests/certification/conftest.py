@@ -1,4 +1,4 @@
-"""The small quadruped and a gait that carries it."""
+"""The small quadruped and a gait for it."""
 
 import numpy as np
 import pytest
@@ -17,9 +17,7 @@ def tiny(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def trotter(tiny):
-    """One diagonal pair swings while the other pushes: hip and knee angles per leg, found by
-    hand.
-    """
+    """Trot found by hand: one diagonal pair swings while the other pushes."""
     column = {name: i for i, name in enumerate(tiny.joints.names)}
     poses = np.zeros((2, 8))
     for leg in LEGS:

@@ -1,4 +1,4 @@
-"""The examination as a whole, its report and its files."""
+"""The whole examination, its report and its files."""
 
 import dataclasses
 import json
@@ -46,11 +46,11 @@ def seen(tiny, trotter, certificate):
 
 @pytest.fixture(scope="module")
 def again(tiny, trotter, certificate, seen):
-    """The third examination of a run, by one thread and after its undisturbed part."""
+    """The third examination of a run, by one thread and after a nominal check."""
     return certify(tiny, trotter, certificate.config, threads=1, seen=seen, attempts=3)
 
 
-def test_a_walk_is_examined_against_all_nine(certificate):
+def test_a_walk_is_examined_by_all_nine_criteria(certificate):
     verdicts = {c.number: c.passed for c in certificate.criteria}
     assert set(verdicts) == set(range(1, 10))
     assert [n for n in (1, 3, 4, 5, 8, 9) if not verdicts[n]] == []
@@ -72,7 +72,7 @@ def test_standing_is_no_walk(tiny):
     assert certificate.report["gait"] == "none"
 
 
-def test_the_file_is_strict_json_with_value_threshold_and_verdict(certificate):
+def test_the_file_is_strict_json_with_value_threshold_and_result(certificate):
     document = json.loads(certificate.to_json(), parse_constant=lambda name: pytest.fail(name))
     assert document["passed"] is certificate.passed
     assert [c["number"] for c in document["criteria"]] == list(range(1, 10))
@@ -91,7 +91,7 @@ def test_the_file_is_strict_json_with_value_threshold_and_verdict(certificate):
     assert 0.1 < document["report"]["push_that_fells_half"] <= 2.0
 
 
-def test_every_champion_is_examined_on_a_draw_of_its_own(tiny, trotter):
+def test_every_champion_is_examined_on_its_own_draw(tiny, trotter):
     config, other = CertificateConfig(), make_champion(tiny)
     mine, again, others, common = (
         trials.starts(tiny, config, draw, 8).joint_offset
@@ -111,7 +111,7 @@ def test_every_champion_is_examined_on_a_draw_of_its_own(tiny, trotter):
         assert not np.isin(trials.starts(tiny, config, draw, 8).joint_offset, (mine, common)).any()
 
 
-def test_the_starts_are_disturbed_in_every_way_that_the_settings_name(tiny):
+def test_the_starts_have_every_disturbance_of_the_settings(tiny):
     starts = trials.starts(tiny, CertificateConfig(), trials.Draw((0,)), 16)
     plain = nominal_starts(tiny, 16)
     changed = {
@@ -132,16 +132,16 @@ def test_the_starts_are_disturbed_in_every_way_that_the_settings_name(tiny):
     }
 
 
-def test_one_is_chosen_on_the_margin_of_criteria_4_and_5(tiny, trotter):
+def test_the_trial_run_returns_the_margin_of_criteria_4_and_5(tiny, trotter):
     config = build(CertificateConfig, SMALL, "test")
     assert rehearse(tiny, trotter, 4, config) == 1.0
     flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
     assert rehearse(tiny, flat, 2, config) == pytest.approx(-9.0)
-    # As soon as one has fallen nothing can be had.
+    # The first fall puts the wanted margin out of reach.
     assert -9.0 <= rehearse(tiny, flat, 2, config, wanted=0.0) <= -4.0
 
 
-def test_the_file_says_which_examination_of_its_run_it_was(certificate, again):
+def test_the_file_has_the_number_of_examinations_of_the_run(certificate, again):
     assert json.loads(certificate.to_json())["attempts"] == 1
     assert json.loads(again.to_json())["attempts"] == 3
     assert again.criteria == certificate.criteria
@@ -177,7 +177,7 @@ def test_a_wrong_setting_is_named(table, words):
         build(CertificateConfig, table, "mine.toml")
 
 
-def test_dimensions_say_where_the_feet_stand(tiny):
+def test_dimensions_have_the_places_of_the_feet(tiny):
     size = dimensions(tiny)
     np.testing.assert_allclose(
         size.foot_places, [(0.2, 0.11), (0.2, -0.11), (-0.2, 0.11), (-0.2, -0.11)], atol=1e-12
@@ -205,14 +205,13 @@ def test_cost_of_transport_counts_positive_work_only():
     assert cost_of_transport(power) == pytest.approx(4.0 / (20.0 * 9.81 * 0.8), rel=1e-3)
 
 
-def test_footfall_phases_are_those_put_in():
+def test_footfall_phases_are_recovered():
     phases = footfall_phases(walk(phases=(0.0, 0.5, 0.25, 0.75)).window(2.0))
     # A foot that leads by a quarter stands a quarter of a cycle earlier.
     np.testing.assert_allclose(phases, [0.0, 0.5, 0.75, 0.25], atol=0.01)
 
 
-# Order of the phases: front left, front right, hind left, hind right; when each foot stands, in
-# cycles.
+# Phases in cycles at which each foot stands: front left, front right, hind left, hind right.
 @pytest.mark.parametrize(
     ("phases", "duty", "name"),
     [
@@ -255,14 +254,14 @@ def test_names_of_hexapod_gaits(phases, duty, name):
     assert gait_name(crab, np.full(6, duty), np.array(phases)) == name
 
 
-def test_what_may_lie_on_the_floor_crawls():
+def test_the_gait_of_a_crawler_is_crawl():
     alien = dataclasses.replace(
         DOG, foot_names=("left", "right"), foot_places=((0.1, 0.1), (0.1, -0.1)), crawler=True
     )
     assert gait_name(alien, np.full(2, 0.5), np.array([0.0, 0.5])) == "crawl"
 
 
-def test_a_glance_is_the_part_that_the_undisturbed_walk_decides(certificate, seen):
-    """What follows a glance is in `again`."""
+def test_the_nominal_check_has_the_margin_of_the_undisturbed_walk(certificate, seen):
+    """`again` covers the examination after a nominal check."""
     alone = min(c.margin for c in certificate.criteria if c.number not in (4, 5))
     assert seen.margin == alone

@@ -1,4 +1,4 @@
-"""Every fact that decides about a certificate is derived twice: each planted error is caught."""
+"""Every fact that decides a certificate is derived twice: each planted error is caught."""
 
 import dataclasses
 
@@ -74,18 +74,19 @@ def test_an_error_in_the_shared_loader_is_named(tiny, thing):
         check_body(wrong)
 
 
-def test_nothing_is_examined_on_wrong_facts(tiny):
+def test_wrong_facts_prevent_an_examination(tiny):
     with pytest.raises(UserError, match="hip height"):
         nominal_check(altered(tiny, frame={"hip_height": 0.1}), make_champion(tiny))
 
 
-def test_the_shipped_creatures_are_what_their_files_say(shipped):
+def test_the_shipped_creatures_match_their_files(shipped):
     check_body(shipped)
 
 
-def test_masses_may_lie_otherwise_on_one_side(tiny, tmp_path):
-    """As in files that say where the middle of a part is as if all legs were left ones; nothing of how
-    joints mirror each other follows from it.
+def test_masses_may_differ_between_the_sides(tiny, tmp_path):
+    """Some files place centres of mass as if all legs were left ones.
+
+    The mirroring of joints does not depend on them.
     """
     text, leg = tiny.files["creature.xml"], '<body name="front_left_upper"'
     assert text.count(leg) == 1
@@ -97,7 +98,7 @@ def test_masses_may_lie_otherwise_on_one_side(tiny, tmp_path):
 
 
 def test_a_body_that_cannot_be_examined_is_not_trained(tiny, tmp_path):
-    """Told at once instead of after the first generations."""
+    """The error comes at once, not after the first generations."""
     wrong = altered(tiny, mirror={"sign": changed(tiny.mirror.sign, 1, -1)})
     with pytest.raises(UserError, match="does not mirror"):
         create_run(tmp_path / "run", wrong, Config())
@@ -105,7 +106,7 @@ def test_a_body_that_cannot_be_examined_is_not_trained(tiny, tmp_path):
 
 
 @pytest.mark.parametrize("degrees", [20.0, 90.0, 300.0])
-def test_the_pose_ranges_of_a_span_are_derived_a_second_time(shipped, degrees):
+def test_the_pose_ranges_of_a_span_pass_the_check(shipped, degrees):
     check_body(shipped.spanned(degrees), degrees)
 
 
@@ -113,13 +114,13 @@ def test_the_pose_ranges_of_a_span_are_derived_a_second_time(shipped, degrees):
     ("has", "stated"), [(0.0, 70.0), (70.0, 0.0), (60.0, 70.0)], ids=["none", "unstated", "other"]
 )
 def test_a_pose_range_of_another_span_is_named(tiny, has, stated):
-    """The range decides what a champion may hold, so the run's own number is the only one."""
+    """The range limits the champion's poses, so only the run's own span is valid."""
     with pytest.raises(UserError, match='lowest pose of joint "front_left_hip"'):
         check_body(tiny.spanned(has), stated)
 
 
 def test_a_champion_has_the_pose_ranges_of_its_run(tiny, tmp_path):
-    """Also when it comes from its file; its walk is then looked at."""
+    """This includes a champion read from its file, and its nominal check."""
     champion = dataclasses.replace(make_champion(tiny), pose_span=60.0)
     write_champion(champion, tiny, tmp_path / "champion.json")
     again = read_champion(tmp_path / "champion.json", tiny)
@@ -131,13 +132,13 @@ def test_a_champion_has_the_pose_ranges_of_its_run(tiny, tmp_path):
         nominal_check(tiny, again, short_examination())
 
 
-def test_a_champion_without_a_span_is_written_as_ever(tiny, tmp_path):
+def test_a_champion_without_a_span_has_none_in_its_file(tiny, tmp_path):
     write_champion(make_champion(tiny), tiny, tmp_path / "champion.json")
     assert "pose_span" not in (tmp_path / "champion.json").read_text()
 
 
-def test_a_body_that_sizes_could_grow_into_is_checked_before(tiny, tmp_path, monkeypatch):
-    """The smallest and the largest, each with the run's pose span."""
+def test_the_extreme_sizes_of_a_body_are_checked_before_training(tiny, tmp_path, monkeypatch):
+    """The nominal, smallest and largest bodies, each with the run's pose span."""
     seen = []
     monkeypatch.setattr(folder, "check_body", lambda body, span: seen.append((body, span)))
     settings = build(Config, {"evolution": {"body": 1.25, "pose_span": 60.0}}, "test")
@@ -147,7 +148,7 @@ def test_a_body_that_sizes_could_grow_into_is_checked_before(tiny, tmp_path, mon
     assert hips[1] < hips[0] < hips[2]
 
 
-def test_sizes_that_cannot_be_had_leave_no_folder(tiny, tmp_path):
+def test_impossible_sizes_leave_no_folder(tiny, tmp_path):
     nameless = load_files(
         {
             **tiny.files,

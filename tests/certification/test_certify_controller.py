@@ -1,4 +1,4 @@
-"""The NumPy controller against docs/reference/controller.md, by hand."""
+"""NumPy controller against hand calculations from docs/reference/controller.md."""
 
 import dataclasses
 from types import SimpleNamespace
@@ -33,7 +33,7 @@ def rotation(axis, angle):
 
 
 def made_up(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), seed=None, count=1):
-    """A state; standing still unless a seed draws joints, velocities and dynamics."""
+    """A state that stands still unless a seed draws joints, velocities and dynamics."""
     nv, joints = creature.model.nv, len(creature.joints.stand)
     rng = np.random.default_rng(seed)
     draw = (
@@ -61,7 +61,7 @@ def made_up(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), 
 
 
 def felt(creature, *arguments, **keys):
-    """What the controller senses of a made-up state."""
+    """Observations of the controller in a made-up state."""
     return sense(creature, made_up(creature, *arguments, **keys), READS)
 
 
@@ -149,7 +149,7 @@ def test_rates_are_positive_when_the_angles_grow(tiny):
     assert (pitch, roll) == (pytest.approx(0.05), pytest.approx(0.14))
 
 
-def test_the_corrected_target_is_the_sum_on_the_page(tiny):
+def test_the_corrected_target_equals_the_documented_sum(tiny):
     key_poses = poses(tiny)
     stand = np.full(8, 0.05)
     creature = altered(tiny, joints={"stand": stand})
@@ -169,7 +169,7 @@ def test_the_corrected_target_is_the_sum_on_the_page(tiny):
         assert target[j] == pytest.approx(want, abs=1e-14)
 
 
-def test_the_target_keeps_to_the_joint_ranges(tiny):
+def test_the_target_stays_within_the_joint_ranges(tiny):
     control = twin(tiny, np.full((2, 8), 3.0))
     np.testing.assert_array_equal(
         control.target(np.array([0]), felt(tiny), np.zeros(1, int))[0], tiny.joints.high
@@ -223,7 +223,7 @@ def test_plain_pd(tiny):
     np.testing.assert_allclose(got, np.clip(want, -12, 12))
 
 
-def test_the_position_moves_on_when_the_pose_error_is_below_the_threshold(tiny):
+def test_the_position_advances_if_the_pose_error_is_below_the_threshold(tiny):
     control = twin(tiny, tuning={"threshold": 0.12})
     off = np.zeros((3, 8))
     off[0], off[1], off[2, 0] = 0.119, 0.121, 0.12 * np.sqrt(8) * 0.99
@@ -232,7 +232,7 @@ def test_the_position_moves_on_when_the_pose_error_is_below_the_threshold(tiny):
     )
 
 
-def test_the_clock_moves_on_whatever_the_error(tiny):
+def test_the_clock_advances_at_any_error(tiny):
     control = twin(tiny, tuning={"period": 0.8}, advance="clock")
     far = np.ones((1, 8))
     at = [
@@ -242,14 +242,14 @@ def test_the_clock_moves_on_whatever_the_error(tiny):
     assert at == [0, 0, 1, 20, 39, 0, 1]
 
 
-def test_a_torque_is_only_limited(tiny):
+def test_a_torque_command_is_only_limited(tiny):
     wanted = np.array([[1.0, -2.0, 50.0, -50.0, 0.0, 12.0, -12.0, 3.0]])
     got = Drive(tiny, make_champion(tiny).drive, "torque", STEP).torque(wanted, made_up(tiny))
     np.testing.assert_array_equal(got, np.clip(wanted, -12, 12))
 
 
 def askew(tiny):
-    """A body that lies askew, in C's numbers and in evolution's."""
+    """A tilted body, as a state of the reference simulator and of evolution."""
     import jax.numpy as jnp
 
     from mjxgait.types import Sensed
@@ -269,8 +269,7 @@ def askew(tiny):
     )
 
 
-def test_the_senses_are_those_of_evolution(tiny):
-    """Every name."""
+def test_every_observation_equals_that_of_evolution(tiny):
     import jax.numpy as jnp
 
     from mjxgait.controllers import observations as evolution
@@ -284,7 +283,7 @@ def test_the_senses_are_those_of_evolution(tiny):
 
 
 @pytest.mark.parametrize(("time", "beat"), [(0.0, -1.0), (0.75, 0.5), (1.0, -1.0), (7.25, -0.5)])
-def test_the_beat_begins_anew_every_second(tiny, time, beat):
+def test_the_beat_restarts_every_second(tiny, time, beat):
     import jax.numpy as jnp
 
     from mjxgait.controllers import observations as evolution
@@ -295,9 +294,10 @@ def test_the_beat_begins_anew_every_second(tiny, time, beat):
     assert float(evolution.sense(tiny, sensed, jnp.float32(time), ["beat"])["beat"]) == beat
 
 
-def test_the_senses_that_tasks_add_are_those_of_evolution(tiny):
-    """Every name of every shipped task, but the light, which only blocks see
-    (`tests/tasks/modular/test_roaming.py`).
+def test_observations_added_by_tasks_equal_those_of_evolution(tiny):
+    """Every shipped task, without the light of modular bodies.
+
+    `tests/tasks/modular/test_roaming.py` tests the light.
     """
     import jax.numpy as jnp
 

@@ -1,4 +1,4 @@
-"""Every criterion against a made-up walk that must fail exactly it."""
+"""Every criterion on a made-up walk that must fail only this one."""
 
 import dataclasses
 
@@ -126,9 +126,9 @@ def aimless():
     good = walk()
     rng = np.random.default_rng(0)
     noise = np.cumsum(rng.normal(0, 0.02, (4400, 4)), 0)
-    # As far on the left as on the right.
+    # The same amplitude on the left and on the right.
     noise /= noise[400:].std(0)
-    # It wanders further than the dog's joints go, which is not what is to be found out here.
+    # The noise exceeds the dog's joint ranges, which is not tested here.
     return changed(
         good,
         joint_pos=noise,
@@ -248,7 +248,7 @@ def test_criterion_8_physics(name, value):
     assert failures(changed(good, **{name: values})) == {8}
 
 
-def test_criterion_8_gives_where_a_joint_overshoots_a_little():
+def test_criterion_8_tolerates_a_small_overrun_of_a_joint():
     good = walk()
     joints = good.joint_pos.copy()
     joints[3000, 2], joints[3001, 1] = 0.59, -0.81
@@ -257,7 +257,7 @@ def test_criterion_8_gives_where_a_joint_overshoots_a_little():
     assert criteria.physics(overshooting, CONFIG.physics).passed
 
 
-def test_criterion_8_knows_joints_without_a_range():
+def test_criterion_8_accepts_joints_without_a_range():
     endless = dataclasses.replace(DOG, joint_range=((-np.inf, np.inf),) * 4)
     assert (
         criteria.joint_overrun(
@@ -282,7 +282,7 @@ def test_criterion_9_parts():
     assert half.margin == pytest.approx(0.5)
 
 
-def test_a_walk_that_blew_up_fails_everything_measured_on_it():
+def test_a_diverged_walk_fails_every_criterion_measured_on_it():
     good = walk()
     broken = {
         f.name: np.where(
@@ -319,14 +319,14 @@ def test_margin_is_one_at_best_and_zero_at_the_threshold():
     assert not Measure("nothing", np.nan, "<=", 1.0, 1.0).passed
 
 
-def test_strides_are_footfalls_whatever_the_joints_do():
+def test_strides_are_footfalls_not_joint_cycles():
     assert {3, 7} <= failures(hidden_vibrator())
     hidden, window = hidden_vibrator().window(2.0), walk().window(2.0)
     assert measure.stride_frequency(window, 0.03) == pytest.approx(1 / 0.8, rel=0.01)
     assert measure.stride_frequency(hidden, 0.03) == pytest.approx(6 / 0.8, rel=0.02)
 
 
-def test_strides_are_those_of_the_steadiest_foot():
+def test_strides_come_from_the_steadiest_foot():
     good = walk().window(2.0)
     assert set(np.diff(measure.stride_starts(good))) == {160}
     scuffing = good.foot_height.copy()
@@ -340,7 +340,7 @@ def test_strides_are_those_of_the_steadiest_foot():
     assert set(np.diff(found)) == {160}
 
 
-def test_a_foot_that_moves_once_tells_no_strides():
+def test_a_foot_that_hardly_moves_defines_no_strides():
     good = walk().window(2.0)
     height = good.foot_height.copy()
     height[:, 0] = np.where(np.isin(np.arange(4000), [500, 2500]), 0.1, 0.0)
@@ -371,6 +371,6 @@ def test_push_that_fells_half_lies_between_the_pushes_tried():
     ],
     ids=["walks", "falls late", "falls soon", "blows up", "stands", "goes back", "slides"],
 )
-def test_what_is_no_walk_is_told_in_a_sentence(recording, said):
+def test_the_obstacle_to_a_walk_is_named_in_a_sentence(recording, said):
     found = obstacle(recording(), CONFIG)
     assert found is None if said is None else found.startswith(said)

@@ -1,4 +1,4 @@
-"""Each way of being down, alone: a simulation that is down in one way only."""
+"""Each condition of a fall, in a simulation that meets no other."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ ANYHOW = {"min_up": -1.0, "height": (0.001, 100.0), "touch": False}
 
 
 def flat(creature: Creature) -> Champion:
-    """Lies down on its belly, upright."""
+    """Champion that lies down on its belly, upright."""
     return make_champion(creature, np.tile([1.0, 1.4], (2, 4)))
 
 
@@ -30,22 +30,22 @@ def falls(creature: Creature, champion: Champion, starts: Starts, **fall: object
 @pytest.mark.parametrize(
     "fall", [{"touch": True}, {"height": (0.5, 100.0)}], ids=["touches", "too low"]
 )
-def test_on_its_belly(tiny: Creature, fall: dict):
+def test_lying_on_the_belly_is_a_fall(tiny: Creature, fall: dict):
     starts = nominal_starts(tiny, 1)
     assert falls(tiny, flat(tiny), starts, **fall)
     assert not falls(tiny, flat(tiny), starts)
     assert not falls(tiny, make_champion(tiny), starts, **fall)
 
 
-def test_tipped_over(tiny: Creature):
+def test_tipping_over_is_a_fall(tiny: Creature):
     still = make_champion(tiny)
     assert falls(tiny, still, knocked(tiny), min_up=0.5)
     assert not falls(tiny, still, knocked(tiny))
     assert not falls(tiny, still, nominal_starts(tiny, 1), min_up=0.5)
 
 
-def test_too_high(tiny: Creature):
-    """Knocked against its feet, it is thrown up."""
+def test_rising_too_high_is_a_fall(tiny: Creature):
+    """A knock against its feet throws it up."""
     still = make_champion(tiny)
     assert falls(tiny, still, knocked(tiny), height=(0.001, 1.05))
     assert not falls(tiny, still, nominal_starts(tiny, 1), height=(0.001, 1.05))

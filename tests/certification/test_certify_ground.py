@@ -1,4 +1,4 @@
-"""The examiner on other ground: what is simulated, seen and told there."""
+"""Reference simulator on uneven ground: simulation, heights and measurements."""
 
 import mujoco
 import numpy as np
@@ -24,7 +24,7 @@ def rough(tiny):
 
 
 def seen_from_above(model, x, y):
-    """m, where a ray straight down meets the ground."""
+    """Height in m at which a ray straight down meets the ground."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     above, down = np.array([x, y, 50.0]), np.array([0, 0, -1.0])
@@ -35,7 +35,7 @@ def seen_from_above(model, x, y):
 @pytest.mark.parametrize(
     "text", ["slope:0.2:across", "slope:0.1", "steps:0.1@3", "bumps:0.1", ROUGH]
 )
-def test_the_field_is_the_ground_and_ends_far_away(tiny, text):
+def test_the_height_field_matches_the_ground(tiny, text):
     model, terrain = grounded_model(tiny.on(text)), terrain_of(tiny.on(text))
     places = np.random.default_rng(0).uniform(-6, 6, (60, 2)) * tiny.frame.body_length
     places[:, 0] += 10 * tiny.frame.body_length
@@ -47,7 +47,7 @@ def test_the_field_is_the_ground_and_ends_far_away(tiny, text):
     assert np.ptp(found) > 0.05 * tiny.frame.hip_height
 
 
-def test_the_body_stays_what_it_is(tiny, rough):
+def test_the_ground_does_not_change_the_body(tiny, rough):
     model = grounded_model(slippery(rough, 0.3))
     for field in ("body_mass", "geom_bodyid", "geom_solref", "jnt_range", "dof_armature"):
         np.testing.assert_array_equal(getattr(model, field), getattr(tiny.model, field))
@@ -55,8 +55,8 @@ def test_the_body_stays_what_it_is(tiny, rough):
     assert grounded_model(tiny) is tiny.model
 
 
-def test_heights_are_told_above_the_ground(rough):
-    """Balls put on the ground anywhere are at height zero there, and not above the plane."""
+def test_heights_are_measured_above_the_ground(rough):
+    """Spheres on the ground have height zero there, but not above the plane."""
     terrain, model = terrain_of(rough), examined_model(rough)
     feet = rough.feet.watched[: len(rough.feet.foot_of)]
     size = model.geom_size[feet, 0]
@@ -70,16 +70,16 @@ def test_heights_are_told_above_the_ground(rough):
     assert np.ptp(LowestPoint(model, feet).heights(xpos, xmat)) > 0.01
 
 
-def test_at_the_start_one_stands_as_on_a_plane(tiny):
-    """Where it starts the ground is level, and the field bears it as the plane does."""
+def test_a_body_stands_at_the_start_as_on_a_plane(tiny):
+    """The ground is level at the start, and the field carries a body as the plane does."""
     up = tiny.on("slope:0.1")
     walk = record(up, make_champion(up), 1.0)
     level = record(tiny, make_champion(tiny), 1.0)
     np.testing.assert_allclose(walk.trunk_pos, level.trunk_pos, atol=2e-3)
 
 
-def test_a_walk_up_is_told_as_one(tiny, trotter):
-    """The trunk rises with the ground, and what is told of it does not."""
+def test_a_walk_uphill_is_measured_above_the_ground(tiny, trotter):
+    """The trunk rises with the ground, but its measured height does not."""
     up = tiny.on("slope:0.05")
     outcome = simulate(up, trotter, nominal_starts(up, 1), 8.0, record=1)
     assert outcome.stayed_up.all()

@@ -1,4 +1,4 @@
-"""What the examiner demands of who hops to a goal, and that every simulation has its own goal."""
+"""Acceptance criteria of `hop`, and a goal of its own for each simulation."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -34,13 +34,13 @@ CONFIG, DEMANDS = CertificateConfig(), HopCriteria()
 FRAMES, STEP, GOAL = 4400, 0.005, 1.2
 
 
-# Made-up ways of 22 s
+# Made-up paths of 22 s
 
 
 def to(*places: tuple[float, float], drift: float = 0.0) -> Recording:
-    """A way through these times in s and m ahead, without physics.
+    """Path through these points (s, m ahead), without physics.
 
-    drift: m to the left of the start in the end, in proportion to the way ahead.
+    drift: m to the left at the goal, in proportion to the distance ahead.
     """
     times, ways = zip(*places, strict=True)
     made = walk()
@@ -54,7 +54,7 @@ def good() -> Recording:
 
 
 def changed(at: float, **values: object) -> Recording:
-    """The good way with other values in one frame."""
+    """The good path with other values in one frame."""
     made = good()
     arrays = {name: np.array(getattr(made, name)) for name in values}
     for name, array in arrays.items():
@@ -68,7 +68,7 @@ def failures(whole: Recording, halved: Recording | None = None) -> set[int]:
     return {c.number for c in evaluation if not c.passed}
 
 
-def test_who_arrives_and_stays_passes():
+def test_arriving_and_staying_passes():
     assert failures(good()) == set()
 
 
@@ -104,22 +104,22 @@ def test_criterion_2_arrives_and_stays(way: Recording):
 
 @pytest.mark.parametrize("name_and_value", [{"touch": True}, {"trunk_up": 0.1}])
 @pytest.mark.parametrize("at", [0.5, 20.0])
-def test_criterion_1_no_head_on_the_floor_from_the_first_moment_on(at: float, name_and_value: dict):
+def test_criterion_1_holds_from_the_first_moment(at: float, name_and_value: dict):
     assert failures(changed(at, **name_and_value)) == {1}
     assert failures(good(), halved=changed(at, **name_and_value)) == {6}
 
 
-def test_it_may_be_as_high_as_it_likes():
+def test_height_is_not_limited():
     assert failures(changed(1.0, trunk_pos=[0.4, 0.0, 2.0])) == set()
 
 
-def test_physics_and_parts_hold_from_the_first_moment_on():
+def test_criteria_8_and_9_hold_from_the_first_moment():
     assert failures(changed(0.5, torque=31.0)) == {8}
     assert failures(changed(0.5, joint_vel=21.0)) == {8}
     assert failures(changed(0.5, overlap=0.03 * DOG.hip_height)) == {9}
 
 
-def test_a_way_that_blew_up_passes_nothing():
+def test_a_diverged_recording_fails_its_criteria():
     names = ("trunk_pos", "trunk_up", "torque", "overlap", "joint_vel")
     made = good()
     late = np.arange(FRAMES) > 3000
@@ -128,7 +128,7 @@ def test_a_way_that_blew_up_passes_nothing():
     assert failures(dataclasses.replace(made, **broken)) == {1, 2, 8, 9}
 
 
-def test_the_report_says_where_it_ends_and_since_when():
+def test_the_report_has_the_remaining_distance_and_the_arrival_time():
     report = DEMANDS.report(to((0, 0), (3, 1.2), (10, 1.2), (11, 1.1), (12, 1.21)), CONFIG)
     # Within 0.06 m again at 1.14 m, on its way back from 1.1 to 1.21 m.
     assert report["arrival"] == pytest.approx(11 + 0.04 / 0.11, abs=0.01)
@@ -149,7 +149,7 @@ def became(ways: list[Recording], fell: list[float]) -> Outcome:
     return Outcome(np.array(fell), np.zeros((len(ways), 2)), path, clear, film, aside=aside)
 
 
-def test_of_the_disturbed_only_those_succeed_that_stay_up_and_at_their_own_goal(tiny: Creature):
+def test_disturbed_trials_succeed_if_they_stay_up_and_at_their_goal(tiny: Creature):
     ways = [good(), good(), good(), to((0, 0), (3, 0.4)), to((0, 0), (20, 1.2))]
     ways.append(to((0, 0), (3, 1.2), drift=0.2))
     starts = nominal_starts(tiny, 6)
@@ -165,7 +165,7 @@ def test_nine_of_ten_must_succeed_and_pushes_do_not_count():
     assert not any(c.passed for c in DEMANDS.disturbed(57 / 64, 1.0, CONFIG))
 
 
-def test_to_be_chosen_one_has_as_long_as_in_the_examination_and_bears_no_pushes(
+def test_the_trial_run_lasts_as_long_as_the_examination_without_pushes(
     tiny: Creature, monkeypatch: pytest.MonkeyPatch
 ):
     tried: list[tuple[int, float]] = []
@@ -185,13 +185,13 @@ def test_to_be_chosen_one_has_as_long_as_in_the_examination_and_bears_no_pushes(
     ("failing", "wanted", "ended", "margin"),
     [
         (0, 0.0, None, 1.0),
-        (6, 0.0, None, 0.0625),  # 58 of 64 do
-        (12, 0.0, 7, -1 / 64 / 0.1 + 0.0625),  # 57 at best, whatever the others do
+        (6, 0.0, None, 0.0625),  # 58 of 64 succeed
+        (12, 0.0, 7, -1 / 64 / 0.1 + 0.0625),  # 57 of 64 at best
         (7, -np.inf, None, -1 / 64 / 0.1 + 0.0625),
-        (6, 0.25, 5, 0.21875),  # it would pass, but not with so much room
+        (6, 0.25, 5, 0.21875),  # passes, but not with this margin
     ],
 )
-def test_nobody_is_tried_further_than_what_is_wanted_is_in_reach(
+def test_the_trial_run_ends_if_the_wanted_margin_is_out_of_reach(
     tiny: Creature,
     monkeypatch: pytest.MonkeyPatch,
     failing: int,
@@ -199,7 +199,7 @@ def test_nobody_is_tried_further_than_what_is_wanted_is_in_reach(
     ended: int | None,
     margin: float,
 ):
-    """They fall one by one; all end with the one whose fall decides it."""
+    """Simulations fall one by one; the deciding fall ends them all."""
     told: list[int] = []
 
     def simulated(
@@ -229,8 +229,8 @@ def test_nobody_is_tried_further_than_what_is_wanted_is_in_reach(
 
 
 @pytest.mark.parametrize("task", ["hop", "limbo"])
-def test_in_the_end_all_are_lost_but_those_that_succeed(tiny: Creature, task: str):
-    """And nobody is lost before it cannot be mended any more."""
+def test_at_the_end_all_but_the_successful_are_lost(tiny: Creature, task: str):
+    """None is lost while it can still succeed."""
     acceptance = acceptance_of(task)
     beside = to((0, 0), (3, GOAL), drift=0.5)
     ways = [good(), good(), to((0, 0), (3, 1.0)), to((0, 0), (19, 0), (20, GOAL)), beside, good()]
@@ -242,15 +242,16 @@ def test_in_the_end_all_are_lost_but_those_that_succeed(tiny: Creature, task: st
     lost = acceptance.lost(outcome, starts, FRAMES)
     assert (~lost).tolist() == acceptance.succeeded(outcome, starts, CONFIG).tolist()
     assert lost.tolist() == [False, True, True, True, True, task == "limbo"]
-    # Who stands still may get there yet, until it must be there.
+    # A hopper that stands still can succeed until it must have arrived.
     before = round((CONFIG.seconds - acceptance.wanted(CONFIG).stay) / STEP)
     assert not acceptance.lost(outcome, starts, before)[[2, 3, 4]].any()
     assert acceptance.lost(outcome, starts, before + 1)[[2, 3, 4]].all()
 
 
-def test_a_simulation_ends_when_those_that_are_lost_decide_it(tiny: Creature):
-    """Whatever the threads: nobody is stepped on for long once it is decided. Those that are
-    recorded would go on after their fall.
+def test_simulations_end_when_the_losses_decide_the_result(tiny: Creature):
+    """Stepping ends soon after the decision, with any number of threads.
+
+    Recorded simulations would otherwise continue after their fall.
     """
     flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
     starts = nominal_starts(tiny, 4)
@@ -273,7 +274,7 @@ def test_a_simulation_ends_when_those_that_are_lost_decide_it(tiny: Creature):
         assert hasty.over
 
 
-def test_walking_is_asked_to_stay_up_and_nothing_else(tiny: Creature):
+def test_a_walk_succeeds_by_staying_up(tiny: Creature):
     walking, outcome = acceptance_of("walk"), became([to((0, 0))] * 2, [np.inf, 3.0])
     starts = nominal_starts(tiny, 2)
     assert walking.succeeded(outcome, starts, CONFIG).tolist() == [True, False]
@@ -292,7 +293,9 @@ def test_walking_is_asked_to_stay_up_and_nothing_else(tiny: Creature):
         ([0.01] * 5 + [0.2] * 5, [6] * 10, False),
     ],
 )
-def test_who_is_worth_an_examination(tiny: Creature, off: list, seconds: list, worth: bool):
+def test_which_metrics_are_worth_an_examination(
+    tiny: Creature, off: list, seconds: list, worth: bool
+):
     outcome = {"off": np.array(off), "seconds": np.array(seconds, float)}
     assert promising(DEMANDS, outcome, 6.0, tiny) is worth
 
@@ -305,8 +308,8 @@ def goals(creature: Creature, draw: trials.Draw) -> np.ndarray:
     return DEMANDS.aimed(starts, CONFIG, draw.generator(trials.AIMS)).goal
 
 
-def test_nobody_knows_the_goals_of_the_examination(tiny: Creature, trotter: Champion):
-    """Not evolution, and not who has seen the goals by which champions are chosen."""
+def test_the_goals_of_the_examination_are_new(tiny: Creature, trotter: Champion):
+    """Neither evolution nor the draw that chooses champions has had them."""
     task = Hop(tiny, STEP, 1000, tiny.settings.termination)
     evolved = task.trials(key_of(0), tiny, RolloutConfig(starts=64)).goal[1:]
     mine = goals(tiny, trials.own(trotter, CONFIG))
@@ -319,7 +322,7 @@ def test_nobody_knows_the_goals_of_the_examination(tiny: Creature, trotter: Cham
     assert high - 0.2 < mine.max() <= high
 
 
-def test_drawing_goals_changes_nothing_else_of_the_starts(tiny: Creature):
+def test_drawing_goals_changes_no_other_field_of_the_starts(tiny: Creature):
     starts = perturbed_starts(tiny, 8, np.random.default_rng(0))
     aimed = DEMANDS.aimed(starts, CONFIG, np.random.default_rng(1))
     for field in dataclasses.fields(starts):
@@ -327,20 +330,20 @@ def test_drawing_goals_changes_nothing_else_of_the_starts(tiny: Creature):
         assert same is (field.name != "goal")
 
 
-def test_a_goal_that_is_there_stays(tiny: Creature):
+def test_an_existing_goal_is_kept(tiny: Creature):
     starts = nominal_starts(tiny, 3)
     starts.goal[1] = 0.7
     assert DEMANDS.aimed(starts, CONFIG).goal.tolist() == [1.2, 0.7, 1.2]
 
 
-def test_the_examiner_and_evolution_mean_the_same_goals():
+def test_certificate_and_evolution_use_the_same_goals():
     acceptance = HopConfig()
     assert (acceptance.goals, acceptance.nominal) == (evolution.GOALS, evolution.NOMINAL_GOAL)
     assert acceptance.near == evolution.NEAR
 
 
 class Pointer:
-    """A twin whose joints show how far it is to the goal."""
+    """Reference controller that shows the distance to the goal in its joint commands."""
 
     reads, command, every = ("goal_distance", "forward"), "pose", 1
 
@@ -367,7 +370,7 @@ def pointer(tiny: Creature, monkeypatch: pytest.MonkeyPatch) -> Champion:
     return dataclasses.replace(make_champion(tiny), task="hop")
 
 
-def test_every_simulation_senses_its_own_goal(tiny: Creature, pointer: Champion):
+def test_every_simulation_observes_its_own_goal(tiny: Creature, pointer: Champion):
     starts = nominal_starts(tiny, 3)
     starts.goal[:2] = [0.5, 1.9]
     film = simulate(tiny, pointer, starts, 0.5, record=3).trajectory
@@ -376,8 +379,8 @@ def test_every_simulation_senses_its_own_goal(tiny: Creature, pointer: Champion)
     assert np.abs(forward).max() > 1e-4
 
 
-def test_who_has_another_goal_is_not_taken_for_the_same(tiny: Creature, pointer: Champion):
-    """Undisturbed simulations are simulated once until their push: not these."""
+def test_simulations_with_different_goals_are_not_merged(tiny: Creature, pointer: Champion):
+    """Only equal simulations are simulated once until their push."""
     rng = np.random.default_rng(5)
     pushed = join(pushed_starts(tiny, 2, rng, 0.3, (0.3, 0.4)), nominal_starts(tiny, 1))
     pushed.goal[:] = [1.2, 2.0, 1.2]
@@ -387,7 +390,7 @@ def test_who_has_another_goal_is_not_taken_for_the_same(tiny: Creature, pointer:
         np.testing.assert_array_equal(together.path[row], alone.path[0])
 
 
-def test_the_path_is_that_of_the_recording_and_ends_with_a_fall(tiny: Creature, trotter: Champion):
+def test_the_path_equals_the_recording_and_ends_with_a_fall(tiny: Creature, trotter: Champion):
     starts = pushed_starts(tiny, 4, np.random.default_rng(5), 0.3, (0.2, 0.6))
     together = simulate(tiny, trotter, starts, 1.0, threads=1)
     film = simulate(tiny, trotter, starts, 1.0, record=4)

@@ -1,4 +1,4 @@
-"""Every measure of every criterion on a made-up walk that violates just this one."""
+"""Every measure of every criterion on a made-up walk that violates only this one."""
 
 import dataclasses
 from collections.abc import Callable
@@ -33,11 +33,11 @@ CONFIG = CertificateConfig()
 AT = 3000
 """A frame within the window."""
 EARLY = 100
-"""One before it."""
+"""A frame before the window."""
 
 
 def leaner() -> Recording:
-    """It is down before the window begins: a fall counts from the first moment on."""
+    """It is down before the window begins; a fall counts from the first moment."""
     good = walk()
     return changed(good, trunk_up=np.where(np.arange(4400) == EARLY, 0.4, good.trunk_up))
 
@@ -57,7 +57,7 @@ def fader() -> Recording:
 
 
 def once(name: str, value: float) -> Callable[[], Recording]:
-    """A walk of which one array has a value of its own in one frame."""
+    """A walk with another value of one array in one frame."""
 
     def fraud() -> Recording:
         good = walk()

@@ -1,4 +1,4 @@
-"""Parts that stand in each other: which pairs count, and how deep they are."""
+"""Overlap of parts: which pairs count, and how deep they are."""
 
 import dataclasses
 
@@ -31,7 +31,7 @@ def loaded(folder, xml, toml=TOML):
 
 
 def standing(creature, count=1, **angles):
-    """[count, nq]; angles of joints by name in the last frame."""
+    """Standing poses [count, nq]; angles: of joints by name, in the last frame."""
     qpos = np.tile(creature.stand_qpos, (count, 1))
     for name, angle in angles.items():
         qpos[-1, creature.joints.qpos_adr[creature.joints.names.index(name)]] = angle
@@ -39,7 +39,7 @@ def standing(creature, count=1, **angles):
 
 
 def near_behind(xml):
-    """With the hind legs closer behind the front ones."""
+    """Move the hind legs closer to the front legs."""
     for side in ("", "-"):
         xml = xml.replace(f'pos="-0.2 {side}0.11 0"', f'pos="0.06 {side}0.11 0"')
     return xml
@@ -47,11 +47,11 @@ def near_behind(xml):
 
 @pytest.fixture(scope="module")
 def short(tmp_path_factory):
-    """The tiny quadruped with its legs so near behind each other that they meet when they swing."""
+    """The tiny quadruped with its legs so close that they meet when they swing."""
     return loaded(tmp_path_factory.mktemp("short"), near_behind(XML))
 
 
-def test_legs_that_cross_are_as_deep_in_each_other_as_they_are_thick(short):
+def test_crossing_legs_overlap_by_their_thickness(short):
     # Both thighs swing by asin(0.5) towards each other: their middles are in one place.
     angle = np.arcsin(0.5)
     qpos = standing(short, 3, front_left_hip=angle, hind_left_hip=-angle)
@@ -62,10 +62,11 @@ def test_legs_that_cross_are_as_deep_in_each_other_as_they_are_thick(short):
     assert not any("right" in name for pair in found.pairs for name in pair)
 
 
-def test_cylinders_that_hardly_touch_are_not_deep_in_each_other(tmp_path):
-    """Of two that cross MuJoCo 3.17 may tell contacts as deep as a radius, from one frame to the next.
+def test_cylinders_that_barely_touch_have_a_small_depth(tmp_path):
+    """MuJoCo 3.17 may report a contact as deep as a radius in single frames.
 
-    One is on the trunk, about the hip's axis. The other turns with the leg, 2.59 mm in its end.
+    One cylinder is on the trunk, about the hip's axis. The other turns with the leg and is 2.59 mm
+    deep in its end.
     """
     ahead, aside = np.sqrt([0.5, 0.5]), [-0.0022, -0.0359, 0.1135]
     upright, place, turned = np.array([ahead[0], -ahead[1], 0, 0]), np.zeros(3), np.zeros(4)
@@ -86,10 +87,10 @@ def test_cylinders_that_hardly_touch_are_not_deep_in_each_other(tmp_path):
 
 
 def least_way_out(box, disc, place, axes):
-    """m by which a disc must be moved to be out of a box, whose frame this is.
+    """Least distance in m that moves a disc out of a box, in the frame of the box.
 
-    Two convex shapes are apart along a direction where the one ends before the other begins.
-    place: [3] m, of the disc. axes: [3, 3], its own as columns, the last across it.
+    Two convex shapes are apart along a direction if one ends before the other begins.
+    place: [3] m, centre of the disc. axes: [3, 3], axes of the disc as columns, its normal last.
     """
 
     def shared(way):
@@ -104,9 +105,10 @@ def least_way_out(box, disc, place, axes):
     return min(minimize(shared, way, method="Nelder-Mead").fun for way in best)
 
 
-def test_a_disc_in_a_box_is_as_deep_as_the_least_way_out(tmp_path):
-    """A motor's disc in a trunk: while it turns MuJoCo's contacts tell from 3 to 28 mm of it, so a robot was
-    refused for 25 mm more than in its standing pose.
+def test_the_depth_of_a_disc_in_a_box_is_near_the_least_way_out(tmp_path):
+    """A motor's disc turns in a trunk, and the depth of MuJoCo's contacts varies from 3 to 28 mm.
+
+    A robot was refused for 25 mm more than in its standing pose.
     """
     box, disc = np.array([0.3235, 0.15, 0.075]), (0.05, 0.01)
     beside = np.array([0.3455, -0.1455, 0.0142])
@@ -143,7 +145,7 @@ def test_a_disc_in_a_box_is_as_deep_as_the_least_way_out(tmp_path):
     assert (both < 2 * np.array(deep)).all()
 
 
-def test_every_shape_counts_but_the_floor(short):
+def test_every_shape_counts_except_the_floor(short):
     model = colliding_with_itself(short)
     assert (model.geom_contype[model.geom_bodyid > 0] == 1).all()
     assert model.geom("floor").contype == model.geom("floor").conaffinity == 0
@@ -152,12 +154,12 @@ def test_every_shape_counts_but_the_floor(short):
     assert overlaps(short, sunk).pairs == ()
 
 
-def test_a_knee_that_folds_puts_no_part_into_its_neighbour(short):
+def test_a_folded_knee_causes_no_overlap(short):
     assert overlaps(short, standing(short, 2, front_left_knee=-1.2)).pairs == ()
 
 
-def test_what_is_welded_on_is_one_with_its_part(tmp_path):
-    """No joint lies between the two."""
+def test_a_welded_body_is_one_with_its_parent(tmp_path):
+    """No joint separates the two."""
     plate = '<body name="plate"><geom size="0.03" pos="0.2 0 0" mass="0.01"/></body>'
     creature = loaded(tmp_path, XML.replace("<freejoint/>", "<freejoint/>" + plate))
     names = creature.model.body
@@ -175,7 +177,7 @@ YOKE = (
 
 
 @pytest.mark.parametrize(("offset", "one_joint"), [(0.0, True), (0.05, False)])
-def test_joints_at_one_place_make_neighbours_of_all_parts_between(tmp_path, offset, one_joint):
+def test_joints_at_one_place_make_the_parts_between_neighbours(tmp_path, offset, one_joint):
     begin = XML.index('<body name="front_left_upper"')
     end = XML.index('<body name="front_right_upper"')
     yoke = YOKE.format(y=0.11 - offset, offset=offset)
@@ -191,8 +193,8 @@ def test_joints_at_one_place_make_neighbours_of_all_parts_between(tmp_path, offs
 
 
 @pytest.mark.parametrize("planar", [True, False])
-def test_legs_of_a_body_in_a_plane_pass_each_other(tmp_path, planar):
-    """The parts of two limbs, in evolution and in the examination; no others."""
+def test_legs_of_a_planar_body_pass_each_other(tmp_path, planar):
+    """Only parts of two limbs pass, in evolution and in the examination."""
     toml = TOML.replace("[creature]", f"[creature]\nplanar = {str(planar).lower()}", 1)
     creature = loaded(tmp_path, near_behind(XML), toml)
     model = creature.model
@@ -207,8 +209,8 @@ def test_legs_of_a_body_in_a_plane_pass_each_other(tmp_path, planar):
     assert any(model.body("trunk").id in pair for pair in watched)
 
 
-def test_the_examiner_sees_for_itself_that_hinges_are_parallel(tmp_path):
-    """Whatever the shared loader lets pass: who turns otherwise could have kept its legs apart."""
+def test_the_examination_checks_that_hinges_are_parallel(tmp_path):
+    """It does not rely on the shared loader: legs with another axis could avoid each other."""
     knee = 'name="front_left_knee" axis="'
     xml = near_behind(XML).replace(knee + "0 1 0", knee + "0.2 1 0")
     creature = loaded(tmp_path, xml, TOML + "\n[mirror]\nsymmetric = false\n")
@@ -220,7 +222,7 @@ def test_the_examiner_sees_for_itself_that_hinges_are_parallel(tmp_path):
     assert ("front_right_lower", "hind_right_lower") in pairs
 
 
-def test_a_body_in_a_plane_has_parallel_hinges(tmp_path):
+def test_a_planar_body_needs_parallel_hinges(tmp_path):
     knee = 'name="hind_left_knee" axis="'
     toml = TOML.replace("[creature]", "[creature]\nplanar = true", 1)
     toml += "\n[mirror]\nsymmetric = false\n"
@@ -228,7 +230,7 @@ def test_a_body_in_a_plane_has_parallel_hinges(tmp_path):
         loaded(tmp_path, XML.replace(knee + "0 1 0", knee + "0.2 1 0"), toml)
 
 
-def test_what_is_built_in_counts_from_its_depth_when_standing(tmp_path):
+def test_overlap_counts_beyond_that_of_the_standing_pose(tmp_path):
     """A shin that stands 5 mm deep in a fender of the trunk, and deeper when the knee stretches."""
     fender = (
         '<geom name="fender" type="box" size="0.01 0.02 0.03" pos="0.22 0.11 -0.2" mass="0"'
@@ -241,13 +243,13 @@ def test_what_is_built_in_counts_from_its_depth_when_standing(tmp_path):
     assert found.depth[:, 0] == pytest.approx([0.0, 0.09 * np.sin(0.05)], abs=5e-4)
 
 
-def test_frames_that_are_not_finite_are_not_looked_at(short):
+def test_frames_that_are_not_finite_have_no_depth(short):
     qpos = standing(short, 3, front_left_hip=0.5, hind_left_hip=-0.5)
     qpos[1] = np.nan
     assert np.isnan(overlaps(short, qpos).depth[1]).all()
 
 
-def test_a_body_whose_legs_cross_fails_the_ninth_criterion_and_is_told_which(short):
+def test_crossing_legs_fail_criterion_9_and_are_named(short):
     column = {name: i for i, name in enumerate(short.joints.names)}
     poses = np.zeros((2, 8))
     for leg in LEGS:
@@ -261,13 +263,13 @@ def test_a_body_whose_legs_cross_fails_the_ninth_criterion_and_is_told_which(sho
     assert worst["share"] > 0.5
 
 
-def test_a_body_that_stands_free_passes_the_ninth(short):
+def test_a_body_without_overlap_passes_criterion_9(short):
     window = record(short, make_champion(short), 2.0).window(0.5)
     assert criteria.parts(window, SHORT.parts).margin == 1.0
     assert worst_overlap(window) is None
 
 
-def test_the_ninth_measures_what_exceeds_in_hip_heights(short):
+def test_criterion_9_measures_overlap_in_hip_heights(short):
     window = record(short, make_champion(short), 2.0)
     deep = dataclasses.replace(window, overlap=np.array([[0.0, 0.003], [0.001, 0.0]]))
     assert criteria.parts(deep, SHORT.parts).measures[0].value == 0.003 / short.frame.hip_height

@@ -14,28 +14,28 @@ from mjxgait.reference.stepping import examined_model
 
 
 def refined(creature: Creature, *refine: int) -> Starts:
-    """Nominal starts, each with so many physics steps to a control step."""
+    """Nominal starts. refine: physics steps per control step of each."""
     start = nominal_starts(creature, len(refine))
     return dataclasses.replace(start, refine=np.array(refine))
 
 
 @pytest.mark.parametrize("refine", [1, 2, 4])
-def test_a_control_step_lasts_as_long_however_fine_the_physics(
+def test_a_control_step_keeps_its_length_with_finer_physics(
     tiny: Creature, trotter: Champion, refine: int
 ):
-    """Joints come as far from frame to frame as their speed says."""
+    """From frame to frame joints move by their speed times the control step."""
     walk = record(tiny, trotter, 1.0, refined(tiny, refine))
     way, speed = np.diff(walk.joint_pos, axis=0).ravel(), walk.joint_vel[1:].ravel()
     assert walk.time_step == 0.005
     assert way @ speed / (speed @ speed) == pytest.approx(0.005, rel=0.1)
 
 
-def test_the_step_is_divided(tiny: Creature):
+def test_the_physics_step_is_divided(tiny: Creature):
     batch = batch_of(tiny, examined_model(tiny), refined(tiny, 1, 2))
     assert batch.expand("opt.timestep").tolist() == [0.005, 0.0025]
 
 
-def test_side_by_side_each_walks_as_it_does_alone(tiny: Creature, trotter: Champion):
+def test_simulations_side_by_side_equal_those_alone(tiny: Creature, trotter: Champion):
     together = recordings(tiny, trotter, 1.0, refined(tiny, 1, 2))
     for refine, walk in zip((1, 2), together, strict=True):
         alone = record(tiny, trotter, 1.0, refined(tiny, refine))

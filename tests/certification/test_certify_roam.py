@@ -1,4 +1,4 @@
-"""What the examiner demands of blocks that walk, criterion by criterion, on made-up motions."""
+"""Acceptance criteria of `roam` and `jump` for modular bodies, on made-up motions."""
 
 import dataclasses
 from types import SimpleNamespace
@@ -24,7 +24,7 @@ TIMES = np.arange(FRAMES) * STEP
 
 
 def roam(speed: Any = SPEED, rising: float = 0.0, tilt: Any = 0.0, buried: Any = 0.0) -> Recording:
-    """A way at speeds m/s [T]; tilt: [T] rad of the root about its left."""
+    """Motion at speeds [T] in m/s. tilt: [T] rad, of the root about its left axis."""
     velocity = np.zeros((FRAMES, 3))
     velocity[:, 1], velocity[:, 2] = speed, rising
     middle, still = np.cumsum(velocity, axis=0) * STEP, np.zeros((FRAMES, 4))
@@ -54,7 +54,7 @@ def roam(speed: Any = SPEED, rising: float = 0.0, tilt: Any = 0.0, buried: Any =
 
 
 def jump(height: float, until: float = 22.0, since: float = 0.0) -> Recording:
-    """In the middle of every two seconds."""
+    """Jumps of `height` m in the middle of every two seconds."""
     made = roam()
     assert made.grown
     leaps = (np.abs(TIMES % 2 - 1) < STEP / 2) & (until > TIMES) & (since < TIMES)
@@ -68,18 +68,18 @@ def failures(whole: Recording) -> set[int]:
     return {c.number for c in evaluation if not c.passed}
 
 
-def test_who_gets_on_walks():
+def test_steady_progress_passes():
     assert not failures(roam())
     assert failures(roam(speed=0.19)) == {2, 6}
     assert failures(roam(speed=np.where(TIMES < 12, 0.6, 0.3))) == {2, 6}
 
 
-def test_height_is_no_way():
+def test_rising_is_no_progress():
     assert failures(roam(speed=0.1, rising=1.0)) == {2, 6}
 
 
-def test_it_stays_on_the_side_on_which_it_settled_whichever_that_is():
-    """60° from there are the most."""
+def test_the_tilt_is_limited_from_the_settled_orientation():
+    """The limit is 60°."""
     for settled in (0.0, 1.3):
         for tilt, over in ((1.0, False), (1.1, True)):
             tipping = np.where(TIMES < 2.5, settled, settled + tilt * np.sin(TIMES))
@@ -88,15 +88,15 @@ def test_it_stays_on_the_side_on_which_it_settled_whichever_that_is():
     assert not failures(roam(tilt=falling)), "before it has settled it may fall as it likes"
 
 
-def test_no_block_is_in_the_ground():
-    """5 % of its size, after it has settled."""
+def test_no_block_is_deep_in_the_ground():
+    """The limit is 5 % of its size, once the body has settled."""
     moment = np.abs(TIMES - 10) < STEP / 2
     assert failures(roam(buried=np.where(moment, 0.049, 0.0))) == set()
     assert failures(roam(buried=np.where(moment, 0.051, 0.0))) == {9}
     assert failures(roam(buried=np.where(TIMES < 1.9, 0.3, 0.0))) == set()
 
 
-def test_how_deep_a_block_is_in_the_ground_is_told_in_its_sizes():
+def test_the_depth_in_the_ground_is_in_block_sizes():
     creature = load_creature("blocks")
     rng, model = np.random.default_rng(0), creature.model
     qpos = np.tile(creature.stand_qpos, (4, 1))
@@ -115,7 +115,7 @@ def test_how_deep_a_block_is_in_the_ground_is_told_in_its_sizes():
     assert (seen.buried[:2] <= -seen.low[:2] / least).all()
 
 
-def test_who_is_off_the_ground_over_and_over_jumps():
+def test_repeated_jumps_pass():
     def failed(whole: Recording, halved: Recording) -> set[int]:
         evaluation = JumpCriteria().undisturbed(whole, halved, CONFIG)
         assert [c.number for c in evaluation] == [2, 6, 8, 9]
@@ -136,8 +136,8 @@ def test_who_is_off_the_ground_over_and_over_jumps():
         assert again.passed == (later == 0.0), "in as many seconds as evolution saw"
 
 
-def test_a_jumper_jumps_from_perturbed_starts_again_and_again():
-    """In six of ten spans, in four, once, and always but before it has settled."""
+def test_repeated_jumps_from_perturbed_starts_succeed():
+    """The jumps: in six of ten spans, in four, in one, and in all but too low."""
     recorded = [jump(0.11, until=14.0), jump(0.11, until=10.0), jump(0.5, until=4.0), jump(0.09)]
     low = np.stack([each.grown.low for each in recorded if each.grown])
     film = Trajectory(STEP, *(np.zeros((0, FRAMES)) for _ in range(5)))
@@ -148,7 +148,7 @@ def test_a_jumper_jumps_from_perturbed_starts_again_and_again():
     assert found.tolist() == [True, False, False, False]
 
 
-def test_a_certificate_by_the_earlier_rule_of_modular_bodies_or_walks_is_outdated():
+def test_certificates_by_earlier_rules_are_outdated():
     for task, version in (("walk", 3), ("hop", 2), ("swim", 3), ("jump", 3), ("follow", 3)):
         assert schema_of(task) == version
         champion: Any = SimpleNamespace(task=task, fingerprint="same")

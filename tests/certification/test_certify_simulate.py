@@ -1,6 +1,4 @@
-"""The simulator: right rows, no leaks, the same as a plain loop over MuJoCo, and what is
-measured from it.
-"""
+"""Reference simulator: independent rows, agreement with a plain MuJoCo loop, measurements."""
 
 import dataclasses
 import subprocess
@@ -38,7 +36,7 @@ SECONDS = 1.5
 
 @pytest.fixture(scope="module")
 def mixed(tiny):
-    """Perturbed starts of every kind that are pushed as well, and two that must fall early."""
+    """Starts with every kind of disturbance, and two that must fall early."""
     rng = np.random.default_rng(3)
     noisy = unfamiliar(
         perturbed_starts(tiny, 4, rng, friction=(0.3, 1.5), mass=0.3),
@@ -59,9 +57,7 @@ def outcome(tiny, trotter, mixed):
 
 
 def plain_loop(creature, champion, starts, row, seconds):
-    """One simulation on an MjData with a model of its own, nothing shared with the batch;
-    returns the states before each step.
-    """
+    """States before each step of one simulation that shares nothing with the batch."""
     model = examined_model(creature)
     model.geom_friction[:, 0] *= starts.friction[row]
     model.body_mass[:] *= starts.mass[row]
@@ -120,7 +116,7 @@ def plain_loop(creature, champion, starts, row, seconds):
 
 @pytest.fixture(scope="module", params=["clock", "error"])
 def disturbed(request, tiny, trotter, mixed):
-    """A champion whose corrections act, and its film from all starts."""
+    """A champion with active corrections, and its recording from all starts."""
     champion = make_champion(
         tiny,
         trotter.genome["key_poses"],
@@ -139,7 +135,7 @@ def test_every_disturbance_reaches_the_right_simulation(tiny, mixed, disturbed, 
     np.testing.assert_allclose(got, want, atol=1e-9)
 
 
-def test_rows_do_not_leak_and_threads_do_not_matter(tiny, trotter, mixed, outcome):
+def test_rows_are_independent_and_threads_do_not_matter(tiny, trotter, mixed, outcome):
     three = simulate(tiny, trotter, mixed, SECONDS, record=len(mixed), threads=3)
     np.testing.assert_array_equal(three.trajectory.qpos, outcome.trajectory.qpos)
     np.testing.assert_array_equal(three.fell, outcome.fell)
@@ -148,7 +144,7 @@ def test_rows_do_not_leak_and_threads_do_not_matter(tiny, trotter, mixed, outcom
         np.testing.assert_array_equal(alone.trajectory.qpos[0], outcome.trajectory.qpos[row])
 
 
-def test_leaving_out_the_fallen_changes_nothing_for_the_others(tiny, trotter, mixed, outcome):
+def test_dropping_fallen_simulations_does_not_change_the_others(tiny, trotter, mixed, outcome):
     dropped = simulate(tiny, trotter, mixed, SECONDS, threads=1)
     assert 2 <= np.isfinite(dropped.fell).sum() < len(mixed)
     np.testing.assert_array_equal(dropped.fell, outcome.fell)
@@ -156,7 +152,7 @@ def test_leaving_out_the_fallen_changes_nothing_for_the_others(tiny, trotter, mi
     np.testing.assert_array_equal(dropped.travel[standing], outcome.travel[standing])
 
 
-def test_those_alike_until_their_push_are_simulated_once_and_come_out_as_if_alone(tiny, trotter):
+def test_sharing_a_simulation_until_the_push_does_not_change_it(tiny, trotter):
     pushed = pushed_starts(tiny, 6, np.random.default_rng(5), 1.2, (0.2, 1.2))
     pushed.push_time[-1] = 99.0
     together = simulate(tiny, trotter, pushed, SECONDS, threads=1)
@@ -166,7 +162,7 @@ def test_those_alike_until_their_push_are_simulated_once_and_come_out_as_if_alon
     assert len(set(together.travel[:, 0])) == 6
 
 
-def test_who_falls_before_its_push_has_fallen_when_its_leader_fell(tiny):
+def test_a_fall_before_the_push_is_that_of_the_shared_simulation(tiny):
     flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
     pushed = pushed_starts(tiny, 3, np.random.default_rng(5), 0.1, (1.0, 1.4))
     together = simulate(tiny, flat, pushed, SECONDS, threads=1)
@@ -175,7 +171,7 @@ def test_who_falls_before_its_push_has_fallen_when_its_leader_fell(tiny):
     np.testing.assert_array_equal(together.travel, np.repeat(alone.travel, 3, axis=0))
 
 
-def test_the_same_again_is_the_same(tiny, trotter, mixed, outcome):
+def test_a_repeated_simulation_is_identical(tiny, trotter, mixed, outcome):
     again = simulate(tiny, trotter, mixed, SECONDS, record=len(mixed), threads=1)
     np.testing.assert_array_equal(again.trajectory.qpos, outcome.trajectory.qpos)
     np.testing.assert_array_equal(again.trajectory.torque, outcome.trajectory.torque)
@@ -199,13 +195,13 @@ def test_a_standing_creature_is_carried_by_its_feet_and_does_not_slide(tiny):
     assert recording.trunk_up == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_walk_survives_and_gets_on(tiny, trotter):
+def test_a_walk_survives_and_advances(tiny, trotter):
     assert distance(tiny, trotter, 4.0) > 0.8
     assert survival(tiny, trotter, starts=6, seconds=4.0) == 1.0
 
 
-def test_slip_is_that_of_the_material_at_the_contact(tiny, trotter):
-    """Against the Jacobian of the contact point."""
+def test_slip_is_the_velocity_at_the_contact_point(tiny, trotter):
+    """The expected velocity comes from the Jacobian of the contact point."""
     outcome = simulate(tiny, trotter, nominal_starts(tiny, 1), 1.0, record=1)
     recording = record(tiny, trotter, 1.0)
     model, data = examined_model(tiny), mujoco.MjData(examined_model(tiny))
@@ -224,7 +220,7 @@ def test_slip_is_that_of_the_material_at_the_contact(tiny, trotter):
     assert seen > 20
 
 
-def test_the_recording_looks_along_the_start(tiny, trotter):
+def test_the_recording_is_in_the_frame_of_the_start(tiny, trotter):
     outcome = simulate(tiny, trotter, nominal_starts(tiny, 1), 2.0, record=1)
     recording = record(tiny, trotter, 2.0)
     np.testing.assert_allclose(
@@ -257,7 +253,7 @@ def test_a_commanded_heading_turns_the_walk(tiny, trotter):
     assert not np.allclose(*ways)
 
 
-def test_what_lies_on_its_belly_is_down_though_upright(tiny):
+def test_lying_on_the_belly_is_a_fall_even_if_upright(tiny):
     flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
     starts = nominal_starts(tiny, 1)
     outcome = simulate(tiny, flat, starts, 1.5, record=1)
@@ -267,9 +263,7 @@ def test_what_lies_on_its_belly_is_down_though_upright(tiny):
     ]
 
 
-def test_a_simulation_that_blows_up_is_down_and_does_not_come_back(
-    tiny, trotter, tmp_path, monkeypatch
-):
+def test_a_diverged_simulation_counts_as_fallen_to_the_end(tiny, trotter, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     starts = join(
         nominal_starts(tiny, 1), pushed_starts(tiny, 1, np.random.default_rng(0), 1e6, (0.2, 0.2))
@@ -281,7 +275,7 @@ def test_a_simulation_that_blows_up_is_down_and_does_not_come_back(
     recording = measure(tiny, outcome.trajectory, row=1)
     assert np.isnan(recording.trunk_up[-1])
     assert recording.touch[-1]
-    # MuJoCo leaves a log where it is run when it meets numbers that are not finite.
+    # MuJoCo writes a log into the current folder when numbers are not finite.
     assert not list(tmp_path.iterdir())
 
 
@@ -304,7 +298,7 @@ def test_perturbations_stay_within_their_bounds(tiny):
     assert pushed.push_time.max() <= 10.0
 
 
-def test_unfamiliar_disturbances_stay_within_their_bounds_and_leave_the_others_alone(tiny):
+def test_unfamiliar_disturbances_stay_in_bounds_and_keep_the_others(tiny):
     familiar = perturbed_starts(tiny, 500, np.random.default_rng(0))
     starts = unfamiliar(
         familiar,
@@ -326,7 +320,7 @@ def test_unfamiliar_disturbances_stay_within_their_bounds_and_leave_the_others_a
         np.testing.assert_array_equal(getattr(starts, name), getattr(familiar, name))
 
 
-def test_what_is_not_asked_for_changes_nothing(tiny):
+def test_unfamiliar_without_arguments_changes_nothing(tiny):
     plain = nominal_starts(tiny, 3)
     same = unfamiliar(plain, np.random.default_rng(0))
     for name in ("stiffness", "damping", "delay", "slope", "floor"):
@@ -334,19 +328,19 @@ def test_what_is_not_asked_for_changes_nothing(tiny):
 
 
 def resting(creature, **changes):
-    """Forward way in m, and depth of the feet in m, after 2 s of standing on a changed start."""
+    """Forward travel and depth of the feet, in m, after 2 s of standing from a changed start."""
     starts = dataclasses.replace(nominal_starts(creature, 1), **changes)
     outcome = simulate(creature, make_champion(creature), starts, 2.0, record=1)
     recording = measure(creature, outcome.trajectory)
     return outcome.travel[0, 0], -recording.foot_height[-1].mean()
 
 
-def test_a_body_sinks_deeper_into_a_softer_floor_and_less_into_a_harder_one(tiny):
+def test_a_body_sinks_deeper_into_a_softer_floor(tiny):
     hard, usual, soft = (resting(tiny, floor=np.array([f]))[1] for f in (0.25, 1.0, 4.0))
     assert 1e-5 < 2 * hard < usual < soft / 1.5
 
 
-def test_what_stands_leans_down_the_slope(tiny):
+def test_a_standing_body_leans_down_the_slope(tiny):
     uphill, downhill = (resting(tiny, slope=np.array([[s, 0.0]]))[0] for s in (0.2, -0.2))
     assert uphill < -1e-3 < 1e-3 < downhill
 
@@ -359,17 +353,17 @@ def test_what_stands_leans_down_the_slope(tiny):
         (None, {"period": np.nan}, 'tuning "period" is nan'),
     ],
 )
-def test_what_is_not_a_number_is_refused_in_one_sentence(
+def test_numbers_that_are_not_finite_are_refused_in_one_sentence(
     tiny, tmp_path, monkeypatch, capfd, poses, tuning, words
 ):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=words):
         nominal_check(tiny, make_champion(tiny, poses, tuning))
-    # MuJoCo would leave a log where it is run, and say the same a thousand times.
+    # MuJoCo would write a log here and repeat its warning a thousand times.
     assert not list(tmp_path.iterdir())
     assert capfd.readouterr() == ("", "")
 
 
-def test_the_examiner_never_imports_jax():
+def test_the_certification_never_imports_jax():
     code = "import mjxgait.certification, sys; sys.exit(any(name.split('.')[0] in ('jax', 'jaxlib', 'mjx') for name in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,4 +1,4 @@
-"""A certificate counts for the champion that was examined, and for no other."""
+"""A certificate counts only for the examined champion."""
 
 import dataclasses
 import json
@@ -41,14 +41,14 @@ def run(tiny, trotter, tmp_path_factory):
     return folder
 
 
-def test_a_certificate_is_of_the_champion_that_was_examined(run, tiny, trotter):
+def test_a_certificate_counts_for_the_examined_champion(run, tiny, trotter):
     document = read_certificate(run / "certificate.json")
     assert document["champion"] == trotter.fingerprint
     assert outdated(document, trotter, tiny) is None
     assert outdated(document, read_champion(run / "champion.json", tiny), tiny) is None
 
 
-def test_times_of_files_do_not_matter(run, tiny):
+def test_file_times_do_not_matter(run, tiny):
     os.utime(run / "certificate.json", (0, 0))
     assert (
         outdated(
@@ -75,20 +75,20 @@ def test_times_of_files_do_not_matter(run, tiny):
     ],
     ids=["pose", "tuning", "controller", "drive", "body"],
 )
-def test_whatever_moves_otherwise_is_another_champion(run, tiny, trotter, change):
+def test_a_change_of_motion_makes_another_champion(run, tiny, trotter, change):
     other = dataclasses.replace(trotter, **change(trotter))
     assert "another champion" in outdated(read_certificate(run / "certificate.json"), other, tiny)
 
 
-def test_fitness_and_origin_are_not_what_was_examined(run, tiny, trotter):
+def test_fitness_and_origin_do_not_affect_the_certificate(run, tiny, trotter):
     same = dataclasses.replace(
         trotter, fitness=9.0, terms={"distance": 1.0}, origin={"generation": 3}
     )
     assert outdated(read_certificate(run / "certificate.json"), same, tiny) is None
 
 
-def test_poses_in_single_precision_have_the_fingerprint_of_what_is_written(tiny, trotter, tmp_path):
-    """Evolution hands over float32."""
+def test_single_precision_poses_keep_their_fingerprint_in_the_file(tiny, trotter, tmp_path):
+    """Evolution returns float32."""
     single = dataclasses.replace(
         trotter,
         genome={name: array.astype(np.float32) for name, array in trotter.genome.items()},
@@ -97,7 +97,7 @@ def test_poses_in_single_precision_have_the_fingerprint_of_what_is_written(tiny,
     assert read_champion(tmp_path / "champion.json", tiny).fingerprint == single.fingerprint
 
 
-def test_a_certificate_that_does_not_say_whose_it_is_is_outdated(run, tiny, trotter):
+def test_a_certificate_that_names_no_champion_is_outdated(run, tiny, trotter):
     document = read_certificate(run / "certificate.json")
     del document["champion"]
     assert "does not say which champion" in outdated(document, trotter, tiny)
@@ -114,7 +114,7 @@ def test_a_certificate_that_does_not_say_whose_it_is_is_outdated(run, tiny, trot
         '{"passed": 1, "criteria": []}',
     ],
 )
-def test_what_is_not_a_certificate_is_said(tmp_path, text):
+def test_a_file_that_is_no_certificate_is_reported(tmp_path, text):
     assert read_certificate(tmp_path / "certificate.json") is None
     (tmp_path / "certificate.json").write_text(text)
     with pytest.raises(UserError, match="not a certificate"):
@@ -131,7 +131,7 @@ def test_the_file_is_read_as_written(run):
     ("change", "said"),
     [({"task": "hop"}, "for the task walk"), ({"terrain": "rough:0.2"}, "on flat ground")],
 )
-def test_a_certificate_is_of_one_task_and_one_ground(run, tiny, trotter, change, said):
+def test_a_certificate_counts_for_one_task_and_one_ground(run, tiny, trotter, change, said):
     document = read_certificate(run / "certificate.json")
     ground = change.pop("terrain", "flat")
     champion = dataclasses.replace(trotter, **change)
@@ -139,13 +139,13 @@ def test_a_certificate_is_of_one_task_and_one_ground(run, tiny, trotter, change,
     assert said in outdated(document, champion, tiny.on(ground))
 
 
-def test_without_criteria_nothing_has_passed():
+def test_without_criteria_nothing_passes():
     assert not verdict_on(()).passed
     assert not verdict_on((Criterion(2, "progress", ()),)).passed
     assert not verdict_of(made_up_certificate("", criteria=[])).passed
 
 
-def test_a_stored_verdict_is_derived_from_its_measures():
+def test_a_stored_result_is_derived_from_its_measures():
     good, bad = made_up_certificate("", margin=0.25), made_up_certificate("", (2, "progress"))
     assert verdict_of(good).certified
     assert verdict_of(good).margin == pytest.approx(0.25)
@@ -161,14 +161,14 @@ def test_a_stored_verdict_is_derived_from_its_measures():
     )
 
 
-def test_a_certificate_of_an_earlier_version_has_the_margin_that_it_says():
+def test_a_certificate_of_an_earlier_version_keeps_its_margin():
     document = made_up_certificate("", margin=0.25)
     del document["criteria"][0]["measures"][0]["room"]
     assert verdict_of(document).margin == pytest.approx(0.25)
     assert verdict_of(document).certified
 
 
-def test_other_thresholds_are_told_but_not_those_of_other_tasks():
+def test_other_thresholds_are_reported_but_not_those_of_other_tasks():
     def rules(task="walk", **tables):
         config = build(CertificateConfig, tables, "test")
         return verdict_of(made_up_certificate("", task=task, config=config))
@@ -187,7 +187,7 @@ def test_other_thresholds_are_told_but_not_those_of_other_tasks():
     assert not verdict_of(made_up_certificate("") | {"config": None}).certified
 
 
-def test_an_examination_again_is_compared_measure_by_measure(run, tiny, trotter):
+def test_a_repeated_examination_is_compared_by_measure(run, tiny, trotter):
     stored = read_certificate(run / "certificate.json")
     again = certify(tiny, trotter, build(CertificateConfig, BRIEF, "test")).document()
     assert differences(stored, again) == []
@@ -203,7 +203,7 @@ def test_an_examination_again_is_compared_measure_by_measure(run, tiny, trotter)
     assert differences(stored | {"task": "hop"}, again) == ["task: hop, again walk"]
 
 
-def test_numbers_that_none_is_are_equal():
+def test_missing_numbers_are_equal():
     document = made_up_certificate("") | {"creature_digest": ""}
     document["criteria"][0]["measures"][0]["value"] = None
     document["criteria"][0]["passed"] = document["passed"] = False

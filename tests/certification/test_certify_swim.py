@@ -1,4 +1,4 @@
-"""What the examiner demands of a swimmer, criterion by criterion, on made-up motions."""
+"""Acceptance criteria of `swim` and `follow`, on made-up motions."""
 
 import dataclasses
 from types import SimpleNamespace
@@ -23,12 +23,12 @@ TIMES = np.arange(FRAMES) * STEP
 
 
 def swim(speed: Any = SPEED, aside: Any = 0.0, extra: float = 0.0) -> Recording:
-    """A way at speeds m/s [T], the water pushing as it must, and something else with `extra` N."""
+    """Motion at speeds [T] in m/s, driven by the water and by another force of `extra` N."""
     velocity = np.zeros((FRAMES, 3))
     velocity[:, 2], velocity[:, 1] = speed, aside
     middle = np.cumsum(velocity, axis=0) * STEP
     momentum = MASS * velocity
-    # It strokes: what it exchanges with the water within a stroke is more than what it keeps.
+    # Within a stroke it exchanges more momentum with the water than it keeps.
     stroke = 5 * np.sin(2 * np.pi * TIMES)[:, None] * [1.0, 0.0, 0.0]
     momentum += np.cumsum(stroke, axis=0) * STEP - stroke * STEP
     push = np.diff(momentum, axis=0, append=momentum[-1:]) / STEP - extra * np.array([0, 0, 1.0])
@@ -62,7 +62,7 @@ def failures(whole: Recording, halved: Recording | None = None) -> set[int]:
 
 
 def changed(**values: float) -> Recording:
-    """The good way with other values in one frame."""
+    """The good motion with other values in one frame."""
     made = swim()
     arrays = {name: np.array(getattr(made, name)) for name in values}
     for name, array in arrays.items():
@@ -70,7 +70,7 @@ def changed(**values: float) -> Recording:
     return dataclasses.replace(made, **arrays)
 
 
-def test_a_good_swimmer_passes_whichever_way_it_swims():
+def test_a_good_swimmer_passes_in_any_direction():
     assert not failures(swim())
     assert not failures(swim(speed=0.0, aside=SPEED), swim(speed=0.0, aside=SPEED))
 
@@ -84,17 +84,17 @@ def test_a_good_swimmer_passes_whichever_way_it_swims():
     ],
     ids=["slow", "to and fro", "tired"],
 )
-def test_who_is_slow_or_crooked_or_tires_does_not_swim(bad: Recording):
+def test_a_slow_crooked_or_tiring_swimmer_fails(bad: Recording):
     assert 2 in failures(bad, bad)
 
 
-def test_half_the_time_step_must_tell_the_same():
+def test_half_the_time_step_must_agree():
     assert failures(swim(), swim(speed=SPEED * 1.19)) == set()
     assert failures(swim(), swim(speed=SPEED * 1.21)) == {6}
     assert failures(swim(speed=0.21), swim(speed=0.19)) == {6}
 
 
-def test_no_machine_is_as_fast_or_as_strong():
+def test_speed_and_torque_have_physical_limits():
     limit = swim().dimensions.torque_limit[0]
     assert failures(changed(joint_vel=19.9)) == set()
     assert failures(changed(joint_vel=20.1)) == {8}
@@ -103,18 +103,18 @@ def test_no_machine_is_as_fast_or_as_strong():
 
 
 def test_no_block_is_deep_in_another():
-    """5 % of the smaller's size."""
+    """The limit is 5 % of the size of the smaller block."""
     assert failures(changed(overlap=0.0049)) == set()
     assert failures(changed(overlap=0.0051)) == {9}
 
 
-def test_momentum_that_the_water_did_not_give_is_found():
+def test_momentum_from_other_sources_than_the_water_is_found():
     assert failures(swim(extra=0.01)) == set()
     assert failures(swim(extra=0.3)) == {11}
 
 
-def test_what_evolution_said_must_hold():
-    """Over as many seconds as it saw."""
+def test_the_speed_in_evolution_must_hold():
+    """It must hold over as many seconds as evolution simulated."""
     slower = swim(speed=np.where(TIMES < 10, SPEED, 0.1))
     for told, holds in ((SPEED, True), (1.24 * SPEED, True), (1.3 * SPEED, False)):
         champion: Any = SimpleNamespace(
@@ -128,8 +128,11 @@ def test_what_evolution_said_must_hold():
     assert not DEMANDS.kept(nobody, slower, CONFIG)[0].passed
 
 
-def test_a_start_succeeds_whichever_way_it_leads():
-    """By the centre of all mass from 2 s on, as criterion 2 has it; how far the root gets is no matter."""
+def test_a_start_succeeds_in_any_direction():
+    """The centre of mass from 2 s on decides, as in criterion 2.
+
+    The travel of the root does not matter.
+    """
     ways = 0.21 * np.array([[1, 0, 0], [0, 0, -1], [0, 0, 0.9]])
     late = np.maximum(TIMES - 2.0, 0.0)[None, :, None]
     outcome = disturbed(late * ways[:, None] + np.minimum(TIMES, 2.0)[None, :, None])
@@ -141,15 +144,15 @@ def test_a_start_succeeds_whichever_way_it_leads():
 
 
 def disturbed(middle: np.ndarray) -> Outcome:
-    """Simulations [S] that nobody recorded, with a centre of mass [S, T, 3]."""
+    """Unrecorded simulations [S] with a centre of mass [S, T, 3]."""
     count = len(middle)
     film = Trajectory(STEP, *(np.zeros((0, FRAMES)) for _ in range(5)))
     path, clear = np.zeros((count, FRAMES)), np.full(count, np.inf)
     return Outcome(np.full(count, np.inf), np.zeros((count, 3)), path, clear, film, middle=middle)
 
 
-def test_a_follower_succeeds_by_its_centre_of_mass_from_two_seconds_on():
-    """At 0.11 m/s towards a light 10 m to its left, at 0.09, at 0.11 away from it; upwards on land."""
+def test_follow_is_decided_by_the_centre_of_mass_from_2_s_on():
+    """The light is 10 m to the left: 0.11 and 0.09 m/s towards it, 0.11 away from it, upwards."""
     late = np.maximum(TIMES - 2.0, 0.0)[None, :, None]
     ways = np.array([[0, 0.11, 0], [0, 0.09, 0], [0, -0.11, 0], [0, 0, 0.2]])
     outcome = disturbed(late * ways[:, None])
@@ -159,8 +162,8 @@ def test_a_follower_succeeds_by_its_centre_of_mass_from_two_seconds_on():
         assert found.tolist() == [True, False, False, False]
 
 
-def test_what_is_seen_afloat_is_what_the_water_does():
-    """Against the points of the examiner's water, on the seed's two blocks in random motion."""
+def test_the_measured_push_is_the_force_of_the_water():
+    """The expected force is that of `Water`, on the initial two blocks in random motion."""
     import mujoco
 
     creature = load_creature("blocks")

@@ -1,4 +1,4 @@
-"""The examiner's water and evolution's are the same, and written twice."""
+"""Water of the reference simulator and of evolution: two implementations that agree."""
 
 import jax
 import mujoco
@@ -17,7 +17,7 @@ def graphs() -> Graph:
     return random_graphs(11)
 
 
-def test_the_examiners_water_is_evolutions(graphs: Graph):
+def test_the_reference_water_equals_that_of_evolution(graphs: Graph):
     bodies = bodies_of(graphs)
     state = moments(bodies, 1.0)
     wet = np.asarray(jax.jit(lambda s: TreePlant(IN_WATER).forward(s)[1].bias)(state))
@@ -31,7 +31,7 @@ def test_the_examiners_water_is_evolutions(graphs: Graph):
             push, moment = pushed[body, :3], pushed[body, 3:]
             mujoco.mj_applyFT(model, data, push, moment, data.xipos[body], body, force)
         rows = [*range(6), *(5 + link for link in links)]
-        # What C MuJoCo has of motion, damping and limits; it knows no such water.
+        # C MuJoCo's forces of motion, damping and limits; it has no such water.
         dry = data.qfrc_bias - data.qfrc_passive
         found = dry - wet[rows, lane]
         np.testing.assert_allclose(found, force, atol=1e-4 * np.abs(force).max() + 1e-4)

@@ -1,4 +1,4 @@
-"""What is demanded of a walk of which more was asked, on made-up walks."""
+"""Acceptance criteria of walk targets, on made-up walks."""
 
 import dataclasses
 
@@ -26,7 +26,7 @@ CONFIG = CertificateConfig()
 
 
 def on_a_circle(rate: float, speed: float = 0.8, late: float = 0.0) -> Recording:
-    """A walk that turns by rate in deg/s, its nose behind the heading it is told by `late` deg."""
+    """Walk that turns at `rate` deg/s, its nose `late` deg behind the commanded heading."""
     straight = walk(speed=speed)
     told = np.radians(rate) * straight.time_step * np.arange(len(straight.trunk_pos))
     heading = told - np.radians(late)
@@ -37,7 +37,7 @@ def on_a_circle(rate: float, speed: float = 0.8, late: float = 0.0) -> Recording
 
 
 def missed(recording: Recording, **wish) -> set[str]:
-    """Names of the measures of all criteria that fail under this wish."""
+    """Names of the failed measures of all criteria under these targets."""
     return failed(*acceptance_of("walk", wish).undisturbed(recording, recording, CONFIG))
 
 
@@ -48,8 +48,8 @@ def test_a_speed_may_be_missed_by_a_tenth_to_either_side(asked: float, hit: bool
     assert (missed(walk(speed=0.8), speed=asked) == set()) is hit
 
 
-def test_the_least_speed_and_stride_follow_what_is_asked():
-    """Who sneaks as asked passes; who sneaks unasked does not."""
+def test_the_minimum_speed_and_stride_follow_the_target():
+    """A slow walk passes only with a slow target."""
     sneaks = walk(speed=0.25, period=0.9)
     assert missed(sneaks, speed=0.25) <= {"worst foot's slip / distance"}
     assert {"speed (body lengths/s)"} <= missed(sneaks)
@@ -59,8 +59,8 @@ def test_the_least_speed_and_stride_follow_what_is_asked():
 
 
 @pytest.mark.parametrize("speed", [0.25, 0.4, 0.8])
-def test_who_does_just_what_was_asked_has_room(speed: float):
-    """However slow that is: a run goes on until its walk has some."""
+def test_an_exact_speed_has_a_margin(speed: float):
+    """A run continues until its walk has one, however low the target."""
     asked = walk(speed=speed, period=0.9)
     evaluation = acceptance_of("walk", {"speed": speed}).undisturbed(asked, asked, CONFIG)
     speeds = [m for c in evaluation for m in c.measures if "speed" in m.name and "body" in m.name]
@@ -75,19 +75,19 @@ def test_who_does_just_what_was_asked_has_room(speed: float):
         ((0.0, 0.5, 0.75, 0.25), "walk"),
     ],
 )
-def test_a_gait_is_what_its_footfalls_are(phases: tuple[float, ...], name: str):
+def test_a_gait_is_identified_by_its_footfalls(phases: tuple[float, ...], name: str):
     for asked in ("trot", "pace", "walk"):
         found = missed(walk(phases=phases), gait=asked)
         assert found == (set() if asked == name else {f"footfalls of a {asked}"})
 
 
-def test_a_turn_is_a_walk_along_the_heading_that_it_was_told():
+def test_a_turn_follows_the_commanded_heading():
     turning = on_a_circle(30.0)
     assert missed(turning, turn=30.0) == set()
     assert "off the heading it was told (deg)" in missed(turning, turn=-30.0)
     assert "off the heading it was told (deg)" in missed(on_a_circle(30.0, late=20.0), turn=30.0)
     assert missed(on_a_circle(30.0, late=10.0), turn=30.0) == set()
-    # Unasked it is a walk in circles, and has ended behind where it began.
+    # Without the target it is a walk in circles that ends behind its start.
     assert "drift / distance" in missed(turning)
     said = [
         acceptance_of("walk", wish).report(turning, CONFIG)["obstacle"]
@@ -105,7 +105,7 @@ def test_an_unrolled_circle_is_straight():
     assert unrolled(straight, {"speed": 1.0}) is straight
 
 
-def test_posture_is_held_from_both_sides():
+def test_posture_has_two_sided_limits():
     steady = walk()
     found = posture(steady)
     assert found["sway"] == pytest.approx(np.degrees(0.02 / np.sqrt(2)), rel=1e-2)
@@ -115,14 +115,14 @@ def test_posture_is_held_from_both_sides():
             assert missed(steady, **{name: found[name] + side * 1.1 * room}) != set()
 
 
-def test_a_missed_wish_names_the_number_in_its_way():
+def test_a_missed_target_names_the_number_in_its_way():
     quick = walk(speed=0.8, period=0.4)
     evaluation = acceptance_of("walk", {"speed": 1.5}).undisturbed(quick, quick, CONFIG)
     assert "1.5 m/s" in in_the_way(evaluation)
     assert in_the_way([as_asked(walk(), {"speed": 0.8}, CONFIG)]) is None
 
 
-def test_what_is_asked_is_in_the_report():
+def test_the_targets_are_in_the_report():
     told = acceptance_of("walk", {"speed": 0.8}).report(walk(), CONFIG)
     assert told["asked"] == {"speed": 0.8}
     assert "asked" not in acceptance_of("walk").report(walk(), CONFIG)
@@ -137,7 +137,7 @@ def told() -> np.ndarray:
 
 
 def obeying(late: float = 1.0, off: float = 0.0, falls: int = 0) -> Outcome:
-    """Of simulations that follow what they are told `late` s later, and `off` deg beside it."""
+    """Simulations that follow their commands `late` s later and `off` deg beside."""
     commands = told()
     behind = round(late / STEP)
     held = np.pad(commands, ((0, 0), (behind, 0)))[:, :STEPS]
@@ -149,7 +149,7 @@ def obeying(late: float = 1.0, off: float = 0.0, falls: int = 0) -> Outcome:
     return Outcome(fell, np.zeros((32, 3)), astray, np.full(32, np.inf), film, astray)
 
 
-def test_commands_go_both_ways_after_straight_on():
+def test_commands_start_straight_and_turn_both_ways():
     commands = np.degrees(told())
     assert (commands[:, : round(2.0 / STEP)] == 0).all()
     rates = (commands[:, -1] - commands[:, -2]) / STEP
@@ -171,13 +171,13 @@ def test_commands_go_both_ways_after_straight_on():
     ],
     ids=["soon", "three fall", "four fall", "late", "near", "off"],
 )
-def test_who_is_steered_looks_where_it_is_told(outcome: Outcome, passes: bool):
+def test_steering_keeps_the_commanded_heading(outcome: Outcome, passes: bool):
     (criterion,) = acceptance_of("walk", {"steer": 30.0}).obeyed(outcome, told(), CONFIG)
     assert (criterion.number, criterion.passed) == (11, passes)
 
 
-def test_a_simulation_tells_how_far_it_is_astray(tiny):
-    """Of two that stand, one told to look straight on and one to turn."""
+def test_a_simulation_reports_its_heading_error(tiny):
+    """Two simulations stand, one with a straight command and one with a turn."""
     commands = np.stack([np.zeros(40), np.linspace(0.0, 0.4, 40)])
     starts = nominal_starts(tiny, 2)
     outcome = simulate(tiny, make_champion(tiny), starts, 0.2, heading=commands)

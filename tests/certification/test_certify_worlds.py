@@ -1,4 +1,4 @@
-"""Other ground: as high, as steep and as slippery as asked, and nothing else changed."""
+"""Floors as steep and slippery as set, with nothing else changed."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def rng(seed=0):
         lambda c: slippery(c, 0.4),
     ],
 )
-def test_the_body_stays_what_it_is(tiny, world):
+def test_another_floor_does_not_change_the_body(tiny, world):
     before, after = tiny.model.geom_friction.copy(), world(tiny).model
     for field in (
         "body_mass",
@@ -49,7 +49,7 @@ def test_a_slope_pulls_back_by_its_sine(tiny):
     assert sloping(tiny, np.radians(-30.0)).model.opt.gravity[0] == pytest.approx(9.81 / 2)
 
 
-def test_what_stands_slides_where_the_slope_is_steeper_than_friction_holds(tiny):
+def test_a_standing_body_slides_if_friction_is_below_the_slope(tiny):
     slope, starts = (
         sloping(tiny, np.arctan(0.25)),
         perturbed_starts(tiny, 2, rng(), friction=(1.0, 1.0)),

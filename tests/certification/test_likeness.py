@@ -1,4 +1,4 @@
-"""How like an animal's a walk is: what the examiner makes of it, and what evolution does."""
+"""Likeness of a walk to an animal's, in the certificate and in evolution."""
 
 import dataclasses
 
@@ -26,14 +26,14 @@ STEP, HORIZON = 0.005, 1000
 
 
 def like_an_animal(speed: float = 0.9, stride: float = 1.0, duty: float = 1.0) -> Recording:
-    """A walk with so much of an animal's stride length and duty factor, feet as they stand at rest."""
+    """Walk with these multiples of an animal's stride length and duty factor, feet as at rest."""
     period = stride * animal_stride(speed, DOG.hip_height) / speed
     made = walk(speed=speed, period=period, duty=duty * animal_duty(speed, DOG.hip_height))
     places = np.tile([ahead for ahead, _ in DOG.foot_places], (len(made.trunk_pos), 1))
     return dataclasses.replace(made, foot_ahead=places)
 
 
-def test_an_animal_is_like_one():
+def test_a_walk_like_an_animals_has_full_likeness():
     found = likeness(like_an_animal(), CONFIG.gait.clearance)
     assert found["stride"] == pytest.approx(1.0, rel=0.02)
     assert found["duty_factor"] == pytest.approx(1.0, rel=0.02)
@@ -41,7 +41,7 @@ def test_an_animal_is_like_one():
     assert found["pitch"] == pytest.approx(0.0, abs=0.05)
 
 
-def test_a_foot_that_loses_the_floor_for_a_moment_patters():
+def test_a_foot_that_briefly_loses_the_floor_counts_as_flicker():
     made = like_an_animal()
     assert likeness(made, CONFIG.gait.clearance)["patter"] == 0.0
     # One foot, once in each of its stances.
@@ -52,7 +52,7 @@ def test_a_foot_that_loses_the_floor_for_a_moment_patters():
     assert found["patter"] == pytest.approx(1 / 4, abs=0.03)
 
 
-def test_it_is_said_in_words():
+def test_likeness_is_described_in_words():
     report = acceptance_of("walk").report(like_an_animal(stride=0.7, duty=0.8), CONFIG)
     assert "Strides are 0.7" in in_words(report)
     assert "duty factors 0.8" in in_words(report)
@@ -63,10 +63,8 @@ def test_it_is_said_in_words():
         assert in_words(nothing) is None
 
 
-def test_likeness_is_that_at_its_own_speed():
-    """Figures of Alexander: strides of 1.5 hip heights and a duty factor of 0.63 at a Froude number
-    of a quarter.
-    """
+def test_likeness_is_relative_to_the_speed():
+    """Figures of Alexander: strides of 1.5 hip heights, duty factor 0.63 at Froude number 0.25."""
     speed = np.sqrt(0.25 * 9.81 * DOG.hip_height)
     assert animal_stride(speed, DOG.hip_height) / DOG.hip_height == pytest.approx(1.52, abs=0.01)
     assert animal_duty(speed, DOG.hip_height) == pytest.approx(0.631, abs=0.001)
@@ -75,12 +73,12 @@ def test_likeness_is_that_at_its_own_speed():
     assert short["duty_factor"] == pytest.approx(0.8, rel=0.03)
 
 
-def test_feet_that_stand_ahead_or_behind_are_seen_on_each_foot():
+def test_reach_counts_the_offset_of_each_foot():
     made = like_an_animal()
     for off in ([0.05] * 4, [0.05, 0.05, -0.05, -0.05]):
         moved = dataclasses.replace(made, foot_ahead=made.foot_ahead + off)
         assert likeness(moved, 0.05)["reach"] == pytest.approx(0.05 / DOG.hip_height)
-    # What a foot does in the air is its own affair.
+    # The motion of a foot in the air does not count.
     swings = made.foot_ahead + np.where(made.contact, 0.0, 0.3)
     assert likeness(dataclasses.replace(made, foot_ahead=swings), 0.05)["reach"] < 1e-9
 
@@ -89,7 +87,7 @@ def test_feet_that_stand_ahead_or_behind_are_seen_on_each_foot():
     ("name", "asked", "room"),
     [("stride", 1.0, 0.25), ("duty_factor", 1.0, 0.25), ("reach", 0.0, 0.15), ("pitch", 0.0, 8.0)],
 )
-def test_likeness_is_held(name: str, asked: float, room: float):
+def test_likeness_targets_have_limits(name: str, asked: float, room: float):
     made = like_an_animal()
     near, far = 0.9 * room, 1.15 * room
     spoilt = {
@@ -114,7 +112,7 @@ def natural(tiny: Creature) -> Walk:
 
 
 def stats_of(task: Walk, speed: float, stride: float = 1.0, duty: float = 1.0, **more):
-    """What such a walk leaves behind in evolution, after 5 s."""
+    """Episode statistics of such a walk after 5 s in evolution."""
     hip = task.creature.frame.hip_height
     swings = HORIZON * STEP * speed / (stride * animal_stride(speed, hip))
     way = speed * HORIZON * STEP
@@ -130,13 +128,13 @@ def stats_of(task: Walk, speed: float, stride: float = 1.0, duty: float = 1.0, *
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.5, 1.0])
-def test_evolution_knows_an_animal_at_any_speed(natural: Walk, speed: float):
+def test_evolution_finds_full_likeness_at_any_speed(natural: Walk, speed: float):
     found = evolution.likeness(natural.creature, STEP, HORIZON, stats_of(natural, speed))
     np.testing.assert_allclose([found[name] for name in LIKENESS], [1, 1, 0, 0], atol=1e-5)
 
 
-def test_evolution_misses_what_the_examiner_does(natural: Walk):
-    """By the same figures: strides, duty factor, where feet stand, and the nose."""
+def test_evolution_and_certificate_measure_the_same_likeness(natural: Walk):
+    """They agree on strides, duty factor, places of the feet and pitch."""
     hip = natural.creature.frame.hip_height
     stats = stats_of(natural, 0.5, stride=0.7, duty=0.8)
     stood = 0.1 * hip * stats.contact * jnp.array([1, 1, -1, -1])
@@ -159,14 +157,14 @@ def test_evolution_misses_what_the_examiner_does(natural: Walk):
     [{"stride": 0.8}, {"stride": 1.3}, {"duty": 0.8}, {"duty": 1.2}, {"pitch": 100.0}],
     ids=str,
 )
-def test_what_is_unlike_an_animal_costs(natural: Walk, less: dict):
+def test_unlikeness_to_an_animal_is_penalized(natural: Walk, less: dict):
     config = small_config(fitness={"wish": ANIMAL}).fitness
     like, unlike = (natural.evaluate(stats_of(natural, 0.5, **how), config) for how in ({}, less))
     worse = [n for n in LIKENESS if float(unlike[n]) > float(like[n]) + 0.05]
     assert worse == ["duty_factor" if "duty" in less else next(iter(less))]
 
 
-def test_who_never_lifts_a_foot_is_compared_all_the_same(natural: Walk):
+def test_likeness_is_finite_without_lifted_feet(natural: Walk):
     config = small_config(fitness={"wish": ANIMAL}).fitness
     drags = stats_of(natural, 0.5, swings=np.zeros(4))
     for stats in (drags, dataclasses.replace(drags, steps=jnp.int32(1)), natural.init()):
@@ -179,7 +177,7 @@ def standing(tiny: Creature) -> Outcome:
     return simulate(tiny, make_champion(tiny), nominal_starts(tiny, 1), 0.5, record=1)
 
 
-def test_feet_are_seen_where_they_stand(tiny: Creature, standing: Outcome):
+def test_feet_are_measured_where_they_stand(tiny: Creature, standing: Outcome):
     seen = measure(tiny, standing.trajectory)
     assert seen.foot_ahead is not None
     ahead = [ahead for ahead, _ in seen.dimensions.foot_places]
@@ -187,8 +185,8 @@ def test_feet_are_seen_where_they_stand(tiny: Creature, standing: Outcome):
     np.testing.assert_allclose(tiny.feet.places, seen.dimensions.foot_places, atol=1e-9)
 
 
-def test_feet_are_seen_along_the_nose(tiny: Creature, standing: Outcome):
-    """Whichever way it looks."""
+def test_feet_are_measured_along_the_nose(tiny: Creature, standing: Outcome):
+    """The heading does not matter."""
     film = standing.trajectory
     turned = film.qpos.copy()
     turned[0, :, 3:7] = [0.0, 0.0, 0.0, 1.0]

@@ -1,4 +1,4 @@
-"""docs/reference/certificate.md: which disturbances of criterion 4 are new to a champion, by its settings."""
+"""Disturbances of criterion 4 that evolution lacks, by settings (docs/reference/certificate.md)."""
 
 from pathlib import Path
 
@@ -13,11 +13,11 @@ from mjxgait.tasks.walk.targets import WalkTargets, configured
 
 EXAMINED = CertificateConfig().starts
 WALK = {"masses", "late torques", "slopes"}
-"""New by the default; the softness of the floor is new to all, for no setting changes it."""
+"""New by default. The softness of the floor is always new: no setting changes it."""
 
 
 def new(rollout: RolloutConfig) -> set[str]:
-    """Disturbances of the examination that evolution has weaker or not at all."""
+    """Disturbances of the examination that are weaker or missing in evolution."""
     known = {
         "gains": rollout.gains >= EXAMINED.gains,
         "masses": rollout.masses >= EXAMINED.masses,
@@ -40,11 +40,11 @@ def config_of(name: str, file: str | None = None, **targets: str) -> Config:
 
 
 @pytest.mark.parametrize("name", ["tall_quadruped", "short_quadruped", "crab", "duck", "alien"])
-def test_of_a_walk(name: str):
+def test_new_disturbances_of_a_walk(name: str):
     assert new(config_of(name).rollout) == WALK
 
 
-def test_of_other_settings():
+def test_new_disturbances_of_other_settings():
     assert new(config_of("luxo").rollout) == WALK - {"late torques"}
     anywhere = config_of("tall_quadruped", certificate="anywhere").rollout
     assert new(anywhere) == {"masses"}
@@ -55,7 +55,7 @@ def test_of_other_settings():
     assert config_of("blocks").rollout.starts == 1
 
 
-def test_of_imported_bodies():
+def test_new_disturbances_of_imported_bodies():
     on_two, _ = few_feet(2, hip=0.5, length=0.3, mass=20.0, time_step=0.005)
     assert on_two["rollout"]["latency"] >= EXAMINED.latency
     assert not {"masses", "slope"} & set(on_two["rollout"])

@@ -1,4 +1,4 @@
-"""The second level: a walk is asked for one thing more at a time."""
+"""Stress tests: one additional disturbance of a walk at a time."""
 
 import dataclasses
 import json
@@ -32,8 +32,8 @@ NAMES = [
 ]
 
 
-def test_who_stands_does_not_walk_anywhere(tiny):
-    """It stays up, but gets nowhere: that is no walk."""
+def test_standing_is_not_walking_anywhere(tiny):
+    """It stays up without progress, which is no walk."""
     told = []
     found = stress(tiny, make_champion(tiny), SHORT, told.append)
     assert told == [trial.name for trial in found.trials] == NAMES
@@ -42,14 +42,14 @@ def test_who_stands_does_not_walk_anywhere(tiny):
     assert not found.passed
 
 
-def test_in_haste_nothing_is_tried_after_the_first_failure(tiny):
+def test_a_hasty_stress_test_ends_at_the_first_failure(tiny):
     found = stress(tiny, make_champion(tiny), SHORT, hasty=True)
     assert [trial.name for trial in found.trials] == NAMES[:1]
     assert not found.passed
 
 
-def test_each_trial_is_one_change_from_the_same_starts(tiny, trotter, monkeypatch):
-    """Only what a trial is called after differs from the plain one, ten minutes in its length."""
+def test_each_trial_makes_one_change_to_the_same_starts(tiny, trotter, monkeypatch):
+    """A trial differs from the plain one only by what its name says; ten minutes by its length."""
     seen = []
 
     def simulate(creature, champion, starts, seconds, **_):
@@ -81,7 +81,7 @@ def test_each_trial_is_one_change_from_the_same_starts(tiny, trotter, monkeypatc
     assert pushed == pytest.approx(0.3 * np.sqrt(9.81 * tiny.frame.hip_height))
 
 
-def test_nine_of_ten_must_do_it():
+def test_nine_of_ten_starts_must_succeed():
     trials = (Trial("plain", 1.0, True), Trial("bumps", 0.875, False))
     found = Stress("abc", trials, StressConfig())
     assert not found.passed
@@ -92,6 +92,6 @@ def test_nine_of_ten_must_do_it():
     assert labels == ["100%", "88%"]
 
 
-def test_only_walks_are_stressed(tiny, trotter):
+def test_only_walks_have_stress_tests(tiny, trotter):
     with pytest.raises(UserError, match="only a walk"):
         stress(tiny, dataclasses.replace(trotter, task="hop"), SHORT)

@@ -1,5 +1,7 @@
-"""docs/research/worked-example.md: its code, run as it stands, comes to the certificate's numbers, its table
-shows them, and the stored champion walks that walk.
+"""Worked example of docs/research/worked-example.md.
+
+Its code reproduces the certificate's numbers, its table shows them, and the stored champion repeats
+the stored walk.
 """
 
 import ast
@@ -47,7 +49,7 @@ def certified():
     }
 
 
-def test_the_code_knows_nothing_of_the_examiner():
+def test_the_code_imports_only_numpy():
     imported = {
         a.name
         for node in ast.walk(ast.parse(CODE))
@@ -58,14 +60,14 @@ def test_the_code_knows_nothing_of_the_examiner():
     assert not any(isinstance(node, ast.ImportFrom) for node in ast.walk(ast.parse(CODE)))
 
 
-def test_every_number_of_criteria_2_3_and_7_comes_out_by_hand(by_hand, certified):
+def test_the_code_reproduces_the_numbers_of_criteria_2_3_and_7(by_hand, certified):
     assert by_hand.keys() | NOT_STORED == certified.keys()
     assert not by_hand.keys() & NOT_STORED
     for name, value in by_hand.items():
         assert value == pytest.approx(certified[name], rel=1e-5), name
 
 
-def test_the_table_shows_both(by_hand, certified):
+def test_the_table_shows_both_numbers(by_hand, certified):
     table = re.findall(r"^\| ([^|]+) \| ([\d.]+) \| ([\d.]+) \|$", PAGE, re.MULTILINE)
     assert [row[0] for row in table] == list(by_hand)
     for name, hand, certificate in table:
@@ -81,7 +83,7 @@ def store_walk():
     return module
 
 
-def test_the_page_is_what_the_script_writes(store_walk):
+def test_the_script_writes_the_page(store_walk):
     assert store_walk.page_of(PAGE, FOLDER) == PAGE
     without = store_walk.NUMBERS.sub(r"\1\3", PAGE)
     assert without.count("<!-- numbers: ") == 3
@@ -89,7 +91,7 @@ def test_the_page_is_what_the_script_writes(store_walk):
 
 
 def test_the_stored_champion_walks_the_stored_walk(store_walk):
-    """Simulated once more. Another machine's last digits are not these, but a walk does not drift apart."""
+    """On another machine a new simulation differs in its last digits, but does not drift apart."""
     creature, config = load_creature(FOLDER / "creature"), CertificateConfig()
     champion = read_champion(FOLDER / "champion.json", creature)
     certificate = json.loads((FOLDER / "certificate.json").read_text())

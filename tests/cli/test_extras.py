@@ -1,4 +1,4 @@
-"""What is missing is installed by a command that works where the program was installed from."""
+"""Commands that install missing extras, for a package and for a checkout."""
 
 import sys
 import tomllib
@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package in a folder that has no project file yet."""
+    """A package in a folder without a project file."""
     monkeypatch.setattr(layers.resources, "files", lambda name: tmp_path / "src" / name)
     (tmp_path / "src" / "mjxgait").mkdir(parents=True)
     return tmp_path / "src"
@@ -26,14 +26,14 @@ def test_an_installed_package_is_named(checkout: Path):
     assert install_command("video") == 'pip install "mjxgait[video]"'
 
 
-def test_a_checkout_is_installed_from_where_it_lies(checkout: Path, monkeypatch):
+def test_a_checkout_is_installed_from_its_folder(checkout: Path, monkeypatch):
     (checkout / "pyproject.toml").write_text("")
     assert install_command("video") == f'pip install -e "{checkout}[video]"'
     monkeypatch.chdir(checkout)
     assert install_command("video") == 'pip install -e ".[video]"'
 
 
-def test_the_extras_that_are_named_exist():
+def test_named_extras_exist():
     known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     used = {
         text.partition("install_command('")[2].partition("'")[0]

@@ -1,4 +1,4 @@
-"""A command that is refused leaves no folder behind: the corrected command can have the same one."""
+"""A refused command leaves no folder, so the corrected command can use the same one."""
 
 from pathlib import Path
 
@@ -39,7 +39,7 @@ WALKS = ("--env", STOOL, "--speeds", "0.2", "--turns", "10")
     ],
     ids=["a run", "several runs", "islands", "a repertoire", "a study"],
 )
-def test_a_cluster_that_is_none_is_refused_first(
+def test_an_invalid_cluster_is_refused_first(
     arguments: tuple[object, ...], tmp_path: Path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
@@ -66,7 +66,7 @@ def refuse(*_: object, **__: object) -> None:
     ],
     ids=["a run", "several runs", "a cycle", "a cycle twice", "a repertoire", "a study"],
 )
-def test_a_body_without_a_program_is_refused_first(
+def test_an_unsupported_body_is_refused_first(
     arguments: tuple[object, ...], stool: Creature, tmp_path: Path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
@@ -85,7 +85,7 @@ def test_a_checkpoint_of_a_new_run_is_refused_first(tmp_path: Path, capsys):
     assert not out.exists()
 
 
-def test_an_import_that_is_no_creature_is_not_written(tmp_path: Path, stool: Creature):
+def test_an_invalid_import_is_not_written(tmp_path: Path, stool: Creature):
     files = {**stool.files, "creature.toml": "[creature]\n"}
     with pytest.raises(UserError, match=r"creature\.toml"):
         write_folder(tmp_path / "out", Imported("broken", files, Notes(), True))

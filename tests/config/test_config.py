@@ -69,7 +69,7 @@ def test_a_mistake_is_named_with_its_place(table: dict, words: str):
     assert "\n" not in str(error.value)
 
 
-def test_layers_creature_over_default_and_file_over_creature(tmp_path: Path):
+def test_a_file_overrides_the_creature_which_overrides_the_defaults(tmp_path: Path):
     file = tmp_path / "mine.toml"
     file.write_text("[rollout]\nstarts = 9\n")
     assert resolve_config({"rollout": {"starts": 7, "seconds": 3.0}}, "x").rollout.starts == 7
@@ -77,7 +77,7 @@ def test_layers_creature_over_default_and_file_over_creature(tmp_path: Path):
     assert (both.rollout.starts, both.rollout.seconds) == (9, 3.0)
 
 
-def test_a_table_lies_over_the_shipped_config_that_is_its_base(tmp_path: Path):
+def test_a_table_overrides_its_base(tmp_path: Path):
     shipped = resolve_config({}, "x", Path("other_starts"))
     over = resolve_config({"base": "other_starts", "rollout": {"starts": 7}}, "x")
     assert (over.rollout.starts, shipped.rollout.starts) == (7, 3)
@@ -95,14 +95,14 @@ def test_a_base_may_have_a_base(tmp_path: Path):
 
 
 @pytest.mark.parametrize("base", ['"other_start"', "3", '"styles/calm"', "[1]"])
-def test_a_base_that_is_none_is_named_with_those_that_there_are(tmp_path: Path, base: str):
+def test_an_invalid_base_is_named_with_the_valid_ones(tmp_path: Path, base: str):
     file = tmp_path / "mine.toml"
     file.write_text(f"base = {base}\n")
     with pytest.raises(UserError, match=r"mine\.toml: base = .*other_starts"):
         resolve_config({}, "x", file)
 
 
-def test_the_table_of_a_task_lies_over_that_of_the_task_that_it_is_like():
+def test_the_table_of_a_task_overrides_the_one_it_is_like():
     swim = {"rollout": {"starts": 4, "seconds": 20.0}, "evolution": {"rivals": 3}}
     tables = {"swim": swim, "jump": {"like": "swim", "rollout": {"starts": 2}}}
     creature = {"use": {"controller": "brain"}, "task": tables}
@@ -112,8 +112,8 @@ def test_the_table_of_a_task_lies_over_that_of_the_task_that_it_is_like():
 
 
 @pytest.mark.parametrize("like", ["swin", "jump", 3, [1]])
-def test_a_task_that_is_like_none_is_named(like: object):
-    """Nor is one like itself, by however many steps."""
+def test_an_invalid_like_is_named(like: object):
+    """A task may not be like itself, in any number of steps."""
     tables = {"swim": {"like": "jump"}, "jump": {"like": like}}
     creature = {"use": {"controller": "brain"}, "task": tables}
     for task in ("jump", "swim"):
@@ -142,7 +142,7 @@ termination = { min_up = -1.0 }
 """
 
 
-def test_a_file_may_say_something_else_to_one_creature(tmp_path: Path):
+def test_a_file_may_have_settings_for_one_creature(tmp_path: Path):
     file = tmp_path / "mine.toml"
     file.write_text(MINE)
     train = {"rollout": {"starts": 7, "seconds": 3.0}}
@@ -170,8 +170,8 @@ seconds = 7.0
 """
 
 
-def test_a_file_may_say_something_else_to_one_task(tmp_path: Path):
-    """Over the rest of the file, and below what it says to one creature."""
+def test_a_file_may_have_settings_for_one_task(tmp_path: Path):
+    """They override the rest of the file; those for one creature override them."""
     file = tmp_path / "mine.toml"
     file.write_text(OF_TASKS)
     rollouts = [
@@ -181,21 +181,21 @@ def test_a_file_may_say_something_else_to_one_task(tmp_path: Path):
     assert [(r.starts, r.seconds) for r in rollouts] == [(9, 4.0), (5, 4.0), (5, 6.0), (5, 7.0)]
 
 
-def test_the_task_that_a_name_means_has_the_table(tmp_path: Path):
-    """A body that grows walks by the task `roam`."""
+def test_the_table_of_walk_applies_to_modular_bodies(tmp_path: Path):
+    """A modular body walks by the task `roam`."""
     file = tmp_path / "mine.toml"
     file.write_text("standalone = true\n[task.walk.rollout]\nseconds = 4.5\n")
     use = {"controller": "brain", "task": "walk"}
     assert resolve_config({}, "blocks", file, use).rollout.seconds == 4.5
 
 
-def test_a_table_of_another_task_may_need_what_the_rest_of_the_file_says(tmp_path: Path):
+def test_a_table_of_another_task_may_depend_on_the_rest_of_the_file(tmp_path: Path):
     file = tmp_path / "mine.toml"
     file.write_text('[evolution]\nsurvival = "children"\n[task.hop.evolution]\nelite = 0.25\n')
     assert resolve_config({}, "x", file).evolution.elite == resolve_config({}, "x").evolution.elite
 
 
-def test_tables_of_tasks_come_with_the_base(tmp_path: Path):
+def test_a_base_includes_its_tables_of_tasks(tmp_path: Path):
     file = tmp_path / "mine.toml"
     file.write_text('base = "sims"\n[task.jump.rollout]\nstarts = 3\n')
     found = [
@@ -209,8 +209,8 @@ SIMS = ("swim", "walk", "jump", "follow", "follow-on-land")
 
 
 @pytest.mark.parametrize("task", SIMS)
-def test_the_blocks_of_the_paper_are_the_same_for_every_task(task: str):
-    """Nothing of the creature's own [train] is under them; lights alone differ."""
+def test_the_settings_of_the_sims_paper_are_the_same_for_every_task(task: str):
+    """The creature's own [train] does not apply; only the lights differ."""
     train = read_toml(find_creature("blocks") / "creature.toml")["train"]
     config = resolve_config(train, "blocks", Path("sims"), {"task": task})
     swims = resolve_config(train, "blocks", Path("sims"))
@@ -225,7 +225,7 @@ def test_the_blocks_of_the_paper_are_the_same_for_every_task(task: str):
     assert config.examination == swims.examination
 
 
-def test_under_a_file_that_stands_alone_lies_nothing(tmp_path: Path):
+def test_a_standalone_file_has_no_layers_below(tmp_path: Path):
     file = tmp_path / "mine.toml"
     file.write_text("standalone = true\n[rollout]\nstarts = 9\n")
     found = resolve_config({"rollout": {"seconds": 3.0}, "seed": 4}, "x", file)
@@ -280,7 +280,7 @@ def wilson(creature: str) -> Config:
     return resolve_config(train, creature, Path("wilson"))
 
 
-def test_the_thesis_is_the_same_for_all_but_for_what_it_says_of_single_creatures():
+def test_the_thesis_settings_differ_only_where_the_thesis_does():
     quadruped, crab, duck, alien = map(wilson, ("tall_quadruped", "crab", "duck", "alien"))
     assert wilson("short_quadruped") == quadruped
     assert alien == duck
@@ -296,7 +296,7 @@ def test_the_thesis_is_the_same_for_all_but_for_what_it_says_of_single_creatures
         assert 30 <= config.evolution.population <= 50
 
 
-def test_the_lamp_of_the_papers_has_what_they_say():
+def test_the_lamp_has_the_settings_of_its_papers():
     train = read_toml(find_creature("luxo") / "creature.toml")["train"]
     config = resolve_config(train, "luxo", Path("gritz_hahn"))
     assert (config.use.task, config.use.controller) == ("hop", "program")
@@ -315,7 +315,7 @@ def test_a_broken_file_is_named(tmp_path: Path):
         resolve_config({}, "x", file)
 
 
-def test_an_unknown_creature_lists_the_known():
+def test_an_unknown_creature_lists_the_known_ones():
     with pytest.raises(UserError, match="short_quadruped, tall_quadruped"):
         find_creature("dragon")
 
@@ -331,7 +331,7 @@ def test_configs_are_immutable():
 
 
 def tables_of(cls: type) -> list[type]:
-    """A dataclass of settings and all that it is made of."""
+    """A dataclass of settings and all nested ones."""
     hints = typing.get_type_hints(cls)
     inner = [t for t in hints.values() if dataclasses.is_dataclass(t)]
     return [cls, *(found for t in inner for found in tables_of(t))]
@@ -340,7 +340,7 @@ def tables_of(cls: type) -> list[type]:
 @pytest.mark.parametrize("controller", list(controllers()))
 @pytest.mark.parametrize("task", list(tasks()))
 def test_every_key_is_explained_under_its_own_name(controller: str, task: str):
-    """`train --help` takes its words from here; what a class inherits its base explains."""
+    """`train --help` uses these texts; a base class explains the inherited keys."""
     for cls in tables_of(config_class(UseConfig(controller, task))):
         words = "\n".join(inspect.cleandoc(base.__doc__ or "") for base in cls.__mro__)
         told = set(re.findall(r"^  (\w+): \S", words, re.MULTILINE))

@@ -1,4 +1,4 @@
-"""Stable PD as the rollout computes it, against float64 formulas, and where plain PD fails."""
+"""Stable PD of the rollout against float64 formulas, and where plain PD fails."""
 
 import dataclasses
 import shutil
@@ -18,11 +18,11 @@ from mjxgait.training.experiment import build_experiment
 from mjxgait.types import BodyState
 
 SLIM = {"xla_backend_optimization_level": 0}
-"""Compiling is what takes the time here."""
+"""Most of the time here is compilation."""
 
 
 def reference(mass, bias, q, v, target, kp, kd, limit, h, dofs, constraint) -> np.ndarray:
-    """Tan, Liu & Turk 2011 in float64 over all freedoms, the unactuated ones with zero gain."""
+    """Tan, Liu & Turk 2011 in float64 over all freedoms; unactuated ones have zero gain."""
     nv = len(bias)
     kp_full, kd_full, q_full, v_full, target_full = (np.zeros(nv) for _ in range(5))
     kp_full[dofs], kd_full[dofs], q_full[dofs], v_full[dofs], target_full[dofs] = (
@@ -40,7 +40,7 @@ def reference(mass, bias, q, v, target, kp, kd, limit, h, dofs, constraint) -> n
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A moment of a falling, moving stool under one law. constraint: [nv] of the previous step."""
+    """A moment of a falling, moving stool under one control law."""
 
     stable: bool = True
     counts: bool = False
@@ -61,7 +61,7 @@ H, TARGET = 0.005, np.array([0.3, -0.2, 0.1, 0.4])
 
 
 def moment(creature: Creature, case: Case) -> tuple[mujoco.MjData, np.ndarray]:
-    """The state in C MuJoCo, and the constraint force of the step before."""
+    """The state in C MuJoCo, and the constraint force [nv] of the previous step."""
     rng, data = np.random.default_rng(case.seed), mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
     data.qpos[2] += 0.5
@@ -72,7 +72,7 @@ def moment(creature: Creature, case: Case) -> tuple[mujoco.MjData, np.ndarray]:
 
 
 def wanted(creature: Creature, case: Case) -> np.ndarray:
-    """The torque [J] by the paper, or by the textbook."""
+    """The torque [J] from the paper, or from the textbook for plain PD."""
     (data, constraint), joints = moment(creature, case), creature.joints.dof_adr
     q, v = data.qpos[creature.joints.qpos_adr], data.qvel[joints]
     kp, kd, limit = (
@@ -90,7 +90,7 @@ def wanted(creature: Creature, case: Case) -> np.ndarray:
 
 
 def rules(cases: list[Case]) -> Rules:
-    """As the rollout has them, [L]."""
+    """The rollout's rules, [L]."""
     return Rules(
         stable=jnp.array([case.stable for case in cases]),
         constraint_forces=jnp.array([case.counts for case in cases]),
@@ -105,7 +105,7 @@ def simulator_of(creature: Creature, physics: str) -> Simulator:
 
 @pytest.fixture(scope="module", params=["auto", "mjx"], ids=["the fast step", "plain MJX"])
 def torques(request: pytest.FixtureRequest, stool: Creature) -> dict[str, np.ndarray]:
-    """What the rollout's torque is in every case, all lanes of one program."""
+    """The rollout's torque in every case; all cases are lanes of one program."""
     simulator, cases = simulator_of(stool, request.param), list(CASES.values())
     lanes = simulator.plant.lane_axis
     moments = [moment(stool, case) for case in cases]
@@ -135,7 +135,7 @@ def test_agrees_with_the_paper_in_float64(
     np.testing.assert_allclose(torques[name], wanted(stool, CASES[name]), rtol=2e-4, atol=2e-4)
 
 
-def test_the_cases_reach_the_limit_and_do_not(stool: Creature):
+def test_some_cases_reach_the_torque_limit_and_some_do_not(stool: Creature):
     share = {
         name: np.abs(wanted(stool, case)) / stool.gains.torque_limit for name, case in CASES.items()
     }
@@ -143,8 +143,8 @@ def test_the_cases_reach_the_limit_and_do_not(stool: Creature):
     assert (share["soft and slow"] < 1).all()
 
 
-def test_the_limit_comes_last():
-    """The damping is that of the limited torque: clamping before it would be another controller."""
+def test_the_torque_limit_is_applied_last():
+    """Damping acts on the limited torque; clamping earlier would be another controller."""
     pos, vel, target = np.array([0.0]), np.array([0.0]), np.array([1.0])
     force = pd_force(pos, vel, target, np.array([100.0]), np.array([1.0]), 0.01)
     limited = limited_torque(force, np.array([2000.0]), np.array([0.01]), np.array([50.0]))
@@ -153,7 +153,7 @@ def test_the_limit_comes_last():
 
 @pytest.fixture(scope="module")
 def stiff(tmp_path_factory: pytest.TempPathFactory) -> Creature:
-    """The stool with a damping that explicit integration cannot bear at its step."""
+    """The stool with damping that explicit integration cannot handle at its time step."""
     folder: Path = tmp_path_factory.mktemp("spd") / "stool"
     shutil.copytree(STOOL, folder)
     for file, edits in {
@@ -171,8 +171,8 @@ def stiff(tmp_path_factory: pytest.TempPathFactory) -> Creature:
     return load_creature(folder)
 
 
-def test_stands_where_plain_pd_blows_up(stiff: Creature):
-    """Our torque on our plant for a second on the floor: stable in one lane, plain in the other."""
+def test_stable_pd_stands_where_plain_pd_diverges(stiff: Creature):
+    """One second on the floor with the rollout's torque and physics: one lane stable, one plain."""
     simulator, lanes = simulator_of(stiff, "auto"), [Case(stable=True), Case(stable=False)]
     law, target = rules(lanes), jnp.tile(jnp.float32(stiff.joints.stand)[:, None], 2)
 

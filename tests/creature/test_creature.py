@@ -1,4 +1,4 @@
-"""A creature folder is checked when it is loaded: a Creature that exists can be simulated."""
+"""A creature folder is checked on loading: every Creature object can be simulated."""
 
 import re
 import shutil
@@ -24,7 +24,7 @@ def edited(tmp_path: Path, file: str, old: str, new: str) -> Path:
     return folder
 
 
-def test_shipped_creatures_are_believable_animals(shipped: Creature):
+def test_shipped_creatures_are_plausible_animals(shipped: Creature):
     assert 0.1 < shipped.frame.hip_height < 1.0
     assert 0.1 < shipped.frame.body_length < 2.0
     stands_on_its_trunk = shipped.model.body(shipped.trunk).name in shipped.feet.names
@@ -36,7 +36,7 @@ def test_shipped_creatures_are_believable_animals(shipped: Creature):
 
 
 def test_a_pose_span_is_as_wide_as_the_joint_allows(shipped: Creature):
-    """About the middle of the creature's own range, moved where that would leave the joint's."""
+    """Centred on the creature's own range, shifted where it would leave the joint's range."""
     wide = shipped.spanned(90.0)
     room = shipped.joints.high - shipped.joints.low
     assert np.allclose(wide.joints.pose_high - wide.joints.pose_low, np.minimum(np.pi / 2, room))
@@ -56,7 +56,7 @@ def test_without_a_span_pose_ranges_are_those_of_the_file(shipped: Creature):
     assert (same.joints.pose_high == shipped.joints.pose_high).all()
 
 
-def test_mirroring_twice_is_nothing(shipped: Creature):
+def test_mirroring_twice_is_the_identity(shipped: Creature):
     pose = np.random.default_rng(0).uniform(-1, 1, len(shipped.joints.names))
     once = shipped.mirror.sign * pose[shipped.mirror.partner]
     assert np.allclose(shipped.mirror.sign * once[shipped.mirror.partner], pose)
@@ -71,8 +71,8 @@ def test_mirror_map_agrees_with_the_names(shipped: Creature):
 
 
 def test_mirror_signs_of_single_joints():
-    """Pitch keeps its sign under reflection, roll and yaw change it, because an axis of rotation
-    is a pseudo-vector.
+    """Pitch keeps its sign under reflection; roll and yaw change it, because an axis of rotation is
+    a pseudo-vector.
     """
     axes = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1]], float)
     partner, sign = mirror_map(
@@ -82,8 +82,8 @@ def test_mirror_signs_of_single_joints():
     assert sign.tolist() == [1, -1, -1]
 
 
-def test_a_left_and_a_right_joint_about_one_axis_are_each_others_image():
-    """Shoulder blades that roll about the middle of the chest: what they carry tells them apart."""
+def test_left_and_right_joints_about_one_axis_are_mirror_partners():
+    """Shoulder blades that roll about the middle of the chest differ only in what they carry."""
     chest, ahead = np.zeros((3, 3)), np.tile([1.0, 0, 0], (3, 1))
     blades = np.array([[0.1, 0.08, -0.1], [0.1, -0.08, -0.1], [0.2, 0, 0.1]])
     partner, sign = mirror_map(
@@ -93,7 +93,7 @@ def test_a_left_and_a_right_joint_about_one_axis_are_each_others_image():
     assert sign.tolist() == [-1, -1, -1]
 
 
-def test_a_joint_without_partner_is_named():
+def test_the_error_names_a_joint_without_partner():
     with pytest.raises(UserError, match='joint "b" has no mirror partner'):
         mirror_map(
             np.array([[0, 0, 0], [0, 0.5, 0]]),
@@ -105,9 +105,7 @@ def test_a_joint_without_partner_is_named():
         )
 
 
-def test_pose_ranges_are_degrees_about_the_standing_angle_within_the_joints(
-    stool: Creature, tmp_path: Path
-):
+def test_pose_ranges_are_around_standing_within_the_joint_ranges(stool: Creature, tmp_path: Path):
     assert np.allclose(stool.joints.pose_low, stool.joints.stand - np.radians(40))
     assert np.allclose(stool.joints.pose_high, stool.joints.stand + np.radians(40))
     wide = load_creature(edited(tmp_path, "creature.toml", "[-40, 40]", "[-40, 80]"))
@@ -199,7 +197,9 @@ def test_a_capsule_reaches_its_radius_beyond_its_ends():
         ("creature.xml", 'type="capsule"', 'type="capsul"', "not a model that MuJoCo can load"),
     ],
 )
-def test_a_mistake_is_one_sentence(tmp_path: Path, file: str, old: str, new: str, words: str):
+def test_a_mistake_is_reported_in_one_sentence(
+    tmp_path: Path, file: str, old: str, new: str, words: str
+):
     folder = edited(tmp_path, file, old, new)
     with pytest.raises(UserError) as error:
         load_creature(folder)

@@ -1,4 +1,4 @@
-"""`--way`: the same body, of which another side is ahead."""
+"""`--way`: the same body with another side as its front."""
 
 import dataclasses
 from pathlib import Path
@@ -23,7 +23,7 @@ RNG = np.random.default_rng(5)
 
 @pytest.fixture(scope="module")
 def rich(stool: Creature) -> Creature:
-    """The stool with a weight of everything for every joint."""
+    """The stool with every kind of weight for every joint."""
 
     def table() -> dict[str, float]:
         return {name: float(RNG.normal()) for name in stool.joints.names}
@@ -42,7 +42,7 @@ def weights(creature: Creature, table: dict[str, float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("way", WAYS[1:])
-def test_its_axes_are_turned_and_it_stands_as_before(stool: Creature, way: str):
+def test_facing_turns_the_axes_but_not_the_standing_pose(stool: Creature, way: str):
     turned, frame = facing(stool, way), stool.frame
     ahead = {"back": -frame.forward, "left": frame.left, "right": -frame.left}[way]
     np.testing.assert_allclose(turned.frame.forward, ahead, atol=1e-9)
@@ -56,12 +56,12 @@ def test_its_axes_are_turned_and_it_stands_as_before(stool: Creature, way: str):
 
 
 @pytest.mark.parametrize("way", WAYS[1:])
-def test_a_fall_is_answered_by_the_same_motion(rich: Creature, way: str):
-    """Balance and stepping add up to the same angles, whatever side is called front."""
+def test_the_response_to_a_fall_does_not_depend_on_the_front(rich: Creature, way: str):
+    """Balance and stepping add up to the same angles, whichever side is the front."""
     turned = facing(rich, way)
 
     def answer(creature: Creature, rotation: np.ndarray, fall: np.ndarray) -> np.ndarray:
-        """[J]; rotation: of the trunk. fall: [2] m along world x and y, where the feet are to go."""
+        """Angles [J]. rotation: of the trunk; fall: [2] m along world x and y, the way to step."""
         sensed = SimpleNamespace(trunk_rot=rotation)
         pitch, roll = (float(SENSES[name](creature, sensed, 0.0)) for name in ("pitch", "roll"))
         ahead, left = (fall @ axis[:2] for axis in creature.frame.start_axes)
@@ -79,8 +79,8 @@ def test_a_fall_is_answered_by_the_same_motion(rich: Creature, way: str):
         np.testing.assert_allclose(answer(turned, *moment), answer(rich, *moment), atol=1e-5)
 
 
-def test_backwards_it_steers_the_other_way_and_has_its_mirror(rich: Creature):
-    """As a car in reverse: what turned it to the left turns it to the right."""
+def test_facing_back_reverses_steering_and_keeps_the_mirror(rich: Creature):
+    """Like a car in reverse: what turned it left turns it right."""
     back = facing(rich, "back")
     for table in ("bend", "stride"):
         mine, its = (getattr(c.settings.steering, table) for c in (rich, back))
@@ -94,13 +94,13 @@ def test_backwards_it_steers_the_other_way_and_has_its_mirror(rich: Creature):
 
 
 @pytest.mark.parametrize("way", ["left", "right"])
-def test_aside_its_hips_turn_it_as_they_did(rich: Creature, way: str):
-    """Left of the way is left of it, wherever the way leads."""
+def test_facing_aside_keeps_the_turning_of_the_hips(rich: Creature, way: str):
+    """Left of the direction of travel stays left, whatever that direction is."""
     assert facing(rich, way).settings.stepping.turn == rich.settings.stepping.turn
 
 
-def test_aside_it_is_as_long_as_it_was_wide(stool: Creature):
-    """And has neither a mirror nor a stated length: its image goes the other way."""
+def test_facing_aside_takes_the_width_as_length(stool: Creature):
+    """It has neither a mirror nor a given length: its mirror image walks the other way."""
     stated = dataclasses.replace(stool.settings.creature, body_length=3.0)
     long = dataclasses.replace(stool, settings=dataclasses.replace(stool.settings, creature=stated))
     for way in ("left", "right"):
@@ -119,7 +119,7 @@ def test_a_run_keeps_the_way(tmp_path: Path):
     assert kept.digest == creature.digest
 
 
-def test_forward_changes_nothing(stool: Creature):
+def test_facing_forward_changes_nothing(stool: Creature):
     assert facing(stool, "forward") is stool
 
 
@@ -130,7 +130,7 @@ def test_forward_changes_nothing(stool: Creature):
         (("--env", STOOL, "--way", "up"), "known: back, forward, left, right"),
     ],
 )
-def test_mistakes_are_one_sentence(arguments, words, capsys: pytest.CaptureFixture):
+def test_mistakes_are_reported_in_one_sentence(arguments, words, capsys: pytest.CaptureFixture):
     assert words in said_by(capsys, "train", *arguments, code=2)
     with pytest.raises(UserError, match="--way"):
         load_creature(STOOL, way="up")

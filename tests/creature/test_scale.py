@@ -1,4 +1,4 @@
-"""Parts of another size: lengths, masses and inertias follow, and the files stay as they are."""
+"""Scaled parts: lengths, masses and inertias follow, and the files stay the same."""
 
 from pathlib import Path
 
@@ -12,8 +12,8 @@ from mjxgait.creature.scale import parse_scales, scaled
 from mjxgait.errors import UserError
 
 
-def test_a_whole_creature_scales_as_geometry_says(shipped: Creature):
-    """Length as s, mass as s³, inertia as s⁵."""
+def test_a_whole_creature_scales_by_geometry(shipped: Creature):
+    """Length scales with s, mass with s³, inertia with s⁵."""
     big, s = scaled(shipped, {"*": 1.2}), 1.2
     mine, its = shipped.model, big.model
     assert np.allclose(its.body_mass, s**3 * mine.body_mass)
@@ -25,7 +25,7 @@ def test_a_whole_creature_scales_as_geometry_says(shipped: Creature):
     assert big.digest != shipped.digest
 
 
-def test_only_what_matches_changes():
+def test_only_matching_parts_change():
     dog = load_creature("tall_quadruped")
     longer = scaled(dog, {"*_lower": 1.3})
     for name in (dog.model.body(b).name for b in range(1, dog.model.nbody)):
@@ -35,7 +35,7 @@ def test_only_what_matches_changes():
     assert longer.frame.hip_height > dog.frame.hip_height
 
 
-def test_it_stands_on_its_feet_as_before(stool: Creature):
+def test_a_scaled_creature_still_stands_on_its_feet(stool: Creature):
     tall = scaled(stool, {"*_left": 1.5, "*_right": 1.5})
     for creature in (stool, tall):
         data = mujoco.MjData(creature.model)
@@ -48,7 +48,7 @@ def test_it_stands_on_its_feet_as_before(stool: Creature):
     assert tall.frame.hip_height == pytest.approx(1.5 * stool.frame.hip_height, rel=0.02)
 
 
-def test_patterns_multiply_and_none_changes_nothing(stool: Creature):
+def test_patterns_multiply_and_no_pattern_changes_nothing(stool: Creature):
     twice = scaled(stool, {"*": 1.1, "trunk": 2.0})
     assert twice.model.body("trunk").mass == pytest.approx(
         2.2**3 * stool.model.body("trunk").mass, rel=1e-5
@@ -78,13 +78,13 @@ def test_a_run_keeps_the_scaled_body(tmp_path: Path, stool: Creature):
         (["front_lef=1.2"], 'no part matches "front_lef"; did you mean "front_left"'),
     ],
 )
-def test_a_mistake_is_one_sentence(stool: Creature, texts: list[str], words: str):
+def test_a_mistake_is_reported_in_one_sentence(stool: Creature, texts: list[str], words: str):
     with pytest.raises(UserError, match=words):
         scaled(stool, parse_scales(texts))
 
 
-def test_a_mesh_is_not_scaled_in_silence(stool: Creature):
-    """Its vertices are an asset's, which other parts may share."""
+def test_scaling_a_mesh_is_rejected(stool: Creature):
+    """Its vertices belong to an asset that other parts may share."""
     mesh = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>'
     xml = stool.files["creature.xml"]
     xml = xml.replace("<worldbody>", f"<asset>{mesh}</asset><worldbody>", 1)
@@ -96,7 +96,7 @@ def test_a_mesh_is_not_scaled_in_silence(stool: Creature):
         scaled_files({**stool.files, "creature.xml": xml}, {"trunk": 1.2})
 
 
-def test_the_library_scales_too(stool: Creature):
+def test_the_api_scales_too(stool: Creature):
     from helpers import STOOL
 
     assert load_creature(STOOL, {"*": 0.8}).frame.mass == pytest.approx(0.8**3 * stool.frame.mass)

@@ -1,4 +1,4 @@
-"""Cycles that are drawn from a body's geometry: feet go where the gait says, and the joints can do it."""
+"""Pose cycles drawn from a body's geometry: feet follow the gait, joints keep their ranges."""
 
 import mujoco
 import numpy as np
@@ -18,7 +18,7 @@ NAMES = {2: "walk", 4: "walk", 6: "tripod"}
 
 
 def falls_of(creature: Creature, share: float = 0.6) -> Footfalls:
-    """Of an animal's walk at 0.5 body lengths per second, with so much of its stride."""
+    """Footfalls of an animal's walk at 0.5 body lengths/s; `share`: the share of its stride."""
     hip, speed = creature.frame.hip_height, 0.5 * creature.frame.body_length
     gait = gait_of(NAMES[len(creature.feet.names)], len(creature.feet.names))
     phases = placed(gait, creature.feet.stations)[0]
@@ -27,8 +27,8 @@ def falls_of(creature: Creature, share: float = 0.6) -> Footfalls:
 
 
 def feet_in(creature: Creature, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places [N, 3] in m of the feet from where they stand, ahead, to the left and above, and the
-    cosine [N] of how far each is tipped.
+    """Displacements [N, 3] of the feet in m (ahead, left, up) from the standing pose, and the
+    cosine [N] of each foot's tilt.
     """
     seen = []
     for angles in (creature.joints.stand, pose):
@@ -63,8 +63,8 @@ def walker(shipped: Creature) -> Creature:
     return shipped
 
 
-def test_feet_go_where_the_gait_says(walker: Creature):
-    """Those that stand go back evenly at one height, all together by a stride in a cycle."""
+def test_feet_follow_the_gait(walker: Creature):
+    """Stance feet move back evenly at one height, by one stride per cycle."""
     falls, hip = falls_of(walker), walker.frame.hip_height
     cycle = textbook_cycle(walker, falls, POSES)
     places = np.array([feet_in(walker, pose)[0] for pose in cycle]) / hip
@@ -79,15 +79,15 @@ def test_feet_go_where_the_gait_says(walker: Creature):
         assert above[~stands].max() - CROUCH > 0.06
 
 
-def test_it_is_its_own_mirror_image_half_a_cycle_later(walker: Creature):
+def test_the_cycle_is_its_mirror_image_half_a_cycle_later(walker: Creature):
     cycle = textbook_cycle(walker, falls_of(walker), POSES)
     if walker.mirror.symmetric:
         image = walker.mirror.image(np.roll(cycle, POSES // 2, axis=0))
         np.testing.assert_allclose(image, cycle, atol=1e-6)
 
 
-def test_joints_stay_in_their_ranges_and_others_where_they_stand(walker: Creature):
-    """However long the strides."""
+def test_joints_keep_their_ranges_and_other_joints_do_not_move(walker: Creature):
+    """For any length of stride."""
     joints = walker.joints
     cycle = textbook_cycle(walker, falls_of(walker, share=3.0), POSES)
     assert (cycle >= joints.pose_low - 1e-9).all()
@@ -97,7 +97,7 @@ def test_joints_stay_in_their_ranges_and_others_where_they_stand(walker: Creatur
             assert (angles == stand).all()
 
 
-def test_soles_stay_level_where_a_leg_has_joints_to_spare(walker: Creature):
+def test_feet_stay_level_on_legs_with_ankles(walker: Creature):
     if not any("ankle" in name for name in walker.joints.names):
         pytest.skip("its legs have none")
     for pose in textbook_cycle(walker, falls_of(walker), POSES):

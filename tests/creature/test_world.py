@@ -1,4 +1,4 @@
-"""What evolution would ignore is refused when a creature is loaded; decoration is not."""
+"""Loading rejects what evolution would ignore, and accepts decoration."""
 
 import shutil
 from pathlib import Path
@@ -15,7 +15,7 @@ FREE = "1 0 0 0 0 0 0 0"
 
 
 def with_things(tmp_path: Path, things: str, qpos: str = "", more: str = "") -> Creature:
-    """The stool with other things in its world. qpos: theirs, in the keyframe."""
+    """The stool with other things in its world. qpos: their part of the keyframe."""
     shutil.copytree(STOOL, tmp_path / "stool")
     file = tmp_path / "stool" / "creature.xml"
     text = file.read_text().replace(FLOOR, things + FLOOR)
@@ -48,7 +48,7 @@ STEP = f'<geom {{name}} type="box" size="0.1 0.1 0.1" pos="1 0 0.1" {BITS}/>'
         ),
     ],
 )
-def test_other_things_are_refused(tmp_path: Path, things: str, qpos: str, words: str):
+def test_other_things_in_the_world_are_rejected(tmp_path: Path, things: str, qpos: str, words: str):
     with pytest.raises(UserError) as error:
         with_things(tmp_path, things, qpos)
     assert words in str(error.value)
@@ -57,7 +57,7 @@ def test_other_things_are_refused(tmp_path: Path, things: str, qpos: str, words:
     assert "\n" not in str(error.value)
 
 
-def test_a_step_that_only_an_explicit_pair_makes_touch_is_refused(tmp_path: Path):
+def test_a_geom_with_only_an_explicit_contact_pair_is_rejected(tmp_path: Path):
     pair = '<contact><pair geom1="step" geom2="front_left_foot"/></contact>'
     with pytest.raises(UserError, match='geom "step"'):
         with_things(tmp_path, STEP.format(name='name="step"', bits=0), more=pair)
@@ -77,8 +77,8 @@ def test_decoration_is_allowed(tmp_path: Path, things: str):
     assert with_things(tmp_path, things).name == "stool"
 
 
-def test_an_import_tells_what_it_leaves_out(tmp_path: Path):
-    """A creature is imported without the scene around it, and with a word about that."""
+def test_an_import_reports_what_it_leaves_out(tmp_path: Path):
+    """An import drops the scene around a creature, with a note."""
     text = (STOOL / "creature.xml").read_text()
     step = STEP.format(name='name="step"', bits=3)
     text = text[: text.index("<keyframe>")] + "</mujoco>"

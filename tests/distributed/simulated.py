@@ -1,4 +1,4 @@
-"""A cluster of simulated machines on this one, all of it on 127.0.0.1."""
+"""A cluster of simulated machines, all on 127.0.0.1."""
 
 import contextlib
 import os
@@ -9,16 +9,16 @@ from typing import Any
 
 import psutil
 
-os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray takes the machine's outer address
+os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray takes the external address
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 HERE = "127.0.0.1"
 HASTY = {"health_check_period_ms": 1000, "health_check_failure_threshold": 8}
-"""Else it takes 20 s until a machine that is silent is given up."""
+"""By default Ray gives up a silent machine only after 20 s."""
 
 
 class Machines:
-    """Each has so many cores; the first is the head."""
+    """Machines with a number of cores each; the first is the head."""
 
     def __init__(self) -> None:
         from ray.cluster_utils import Cluster
@@ -43,12 +43,12 @@ class Machines:
         )
 
     def kill(self, node: Any) -> None:
-        """Without a word, as when a plug is pulled."""
+        """Remove a machine without notice, as in a power loss."""
         self.cluster.remove_node(node, allow_graceful=False)
 
 
 def workers() -> list[psutil.Process]:
-    """Those of mjxgait on the machines that this process has started."""
+    """The mjxgait workers on the machines that this process has started."""
     found = []
     for process in psutil.Process().children(recursive=True):
         with contextlib.suppress(psutil.Error):

@@ -1,4 +1,4 @@
-"""A generation judged in blocks is the generation judged at once."""
+"""A generation evaluated in chunks equals one evaluated at once."""
 
 import jax
 import numpy as np
@@ -20,11 +20,11 @@ CONFIG = small_config(rollout={"block": 3})
 @pytest.mark.parametrize(
     ("offspring", "most", "size"), [(256, 64, 64), (250, 64, 50), (64, 100, 64), (6, 4, 3)]
 )
-def test_blocks_are_equal_and_not_too_large(offspring: int, most: int, size: int):
+def test_chunks_are_equal_and_not_too_large(offspring: int, most: int, size: int):
     assert block_size(offspring, most) == size
 
 
-def test_what_cannot_be_cut_is_refused():
+def test_a_population_without_equal_chunks_is_refused():
     with pytest.raises(UserError, match=r"251 offspring.*another --population"):
         block_size(251, 64)
 
@@ -43,12 +43,12 @@ SIMULATED = pytest.mark.thorough(
     ],
     ids=["the better half goes on", "the better half goes on, simulated", "all, simulated"],
 )
-def test_a_generation_by_blocks_is_that_of_one_program(
+def test_a_chunked_generation_equals_that_of_one_program(
     stool: Creature, monkeypatch: pytest.MonkeyPatch, promote: float, simulated: bool
 ):
-    """Who was judged, in which order, and what it cost; terms to the rounding of another program."""
+    """The same individuals, order and cost; terms up to the rounding of another program."""
     if not simulated:
-        for module in (stages, experiment):  # of whole populations, and of blocks
+        for module in (stages, experiment):  # of whole populations, and of chunks
             monkeypatch.setattr(module, "evaluate", made_up_evaluate)
     config = small_config(rollout={"block": 3, "promote": promote})
     run = build_experiment(stool, config)
@@ -67,8 +67,8 @@ def test_a_generation_by_blocks_is_that_of_one_program(
     assert (jax.random.key_data(mine.key) == jax.random.key_data(theirs.key)).all()
 
 
-def test_rows_that_are_handed_out_in_parts_go_where_they_would_have_gone(stool: Creature):
-    """Stopped and packed after each generation, or not: the same bits."""
+def test_rows_dispatched_in_parts_give_the_same_bits(stool: Creature):
+    """Stopped and packed after each generation, or not."""
     recipe, programs = Recipe.of(stool, [CONFIG]), Programs()
     whole = AdvanceRows(None, 2).do(programs, recipe)
     state = None

@@ -1,4 +1,4 @@
-"""What is seen of the machines of a cluster."""
+"""The dashboard of a cluster's machines."""
 
 import io
 
@@ -11,7 +11,7 @@ from mjxgait.distributed.scheduler import LocalBackend, Scheduler, Worker
 
 @pytest.fixture
 def scheduler() -> Scheduler:
-    """Two workers of one machine, one at work; one of another, idle; a third machine has left."""
+    """Two workers on one machine, one busy; an idle one on another; a third machine has left."""
     made = Scheduler(LocalBackend())
     one, other, third = Worker(0, "10.0.0.5"), Worker(1, "10.0.0.5"), Worker(2, "10.0.0.7")
     made.submit("work", lambda: (None, None))
@@ -43,7 +43,7 @@ def test_a_row_per_machine(scheduler: Scheduler):
     assert " ".join(caption) == "pieces of work left: 1"
 
 
-def test_in_a_terminal_it_is_a_table_and_elsewhere_lines(scheduler: Scheduler):
+def test_the_dashboard_is_a_table_in_a_terminal_and_lines_elsewhere(scheduler: Scheduler):
     assert "cluster: 10.0.0.6 has left" in shown(scheduler, terminal=True)
     assert "at work" in shown(scheduler, terminal=True)
     assert shown(scheduler, terminal=False) == "cluster: 10.0.0.6 has left\n"

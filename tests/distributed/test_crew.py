@@ -1,4 +1,4 @@
-"""Who gets which work, when hands are lost, late, or come later. The hands and the clock are made up."""
+"""Scheduling with lost, late and newly joined workers; workers and clock are made up."""
 
 import random
 from typing import Any
@@ -24,7 +24,7 @@ class Clock:
 
 
 class Toys:
-    """Hands that take so many seconds for a piece, by worker, and may be lost instead of done.
+    """A backend with the seconds per job of each worker; a worker may be lost instead of done.
 
     A job is a number, its result the number's square. Waiting moves the clock to the next event.
     """
@@ -68,14 +68,14 @@ def work(*numbers: int) -> list[Any]:
     return [(None, number) for number in numbers]
 
 
-def test_results_come_in_the_order_of_the_work_whoever_was_faster():
+def test_results_come_in_the_order_of_the_jobs():
     scheduler, toys, _ = crew_of([3.0, 1.0])
     assert scheduler.all(work(1, 2, 3, 4, 5)) == [1, 4, 9, 16, 25]
     assert len(toys.begun) == 5
     assert scheduler.done == {"node 0": 1, "node 1": 4}
 
 
-def test_what_a_lost_worker_had_is_done_by_another():
+def test_a_lost_workers_job_is_done_by_another():
     lost = iter(["killed"])
     scheduler, toys, said = crew_of([1.0, 1.0], fate=lambda worker: next(lost, None))
     assert scheduler.all(work(1, 2, 3)) == [1, 4, 9]
@@ -83,36 +83,36 @@ def test_what_a_lost_worker_had_is_done_by_another():
     assert said == ["node 1: a worker is lost (killed); its work is done again"]
 
 
-def test_work_that_costs_every_worker_ends_with_a_sentence():
+def test_a_job_that_loses_every_worker_ends_with_one_sentence():
     scheduler, toys, _ = crew_of([1.0] * (FATAL + 3), fate=lambda worker: "out of memory")
     with pytest.raises(UserError, match=f"has cost {FATAL} workers.*out of memory.*smaller"):
         scheduler.all(work(7))
     assert len(toys.begun) == FATAL
 
 
-def test_nobody_waits_long_for_one_that_stands_still():
-    """The bound that docs/guide/cluster.md states: so many medians, and the time that another takes."""
+def test_a_stalled_worker_causes_only_a_bounded_delay():
+    """The bound in docs/guide/cluster.md: `LATE` medians and the time of another worker."""
     scheduler, toys, _ = crew_of([1.0, 1e9])
     assert scheduler.all(work(*range(8))) == [n**2 for n in range(8)]
     assert [number for number, _ in toys.begun].count(1) == 1
     assert toys.clock.now <= 7 + LATE + 1.0 + 1.0
 
 
-def test_late_work_is_given_to_one_other_and_not_to_all():
+def test_a_late_job_is_given_to_one_other_worker_only():
     scheduler, toys, _ = crew_of([1.0, 1.0, 1.0, 50.0])
     scheduler.all(work(*range(10)))
     slow = [job for number, job in toys.begun if number == 3]
     assert [job for _, job in toys.begun].count(slow[0]) == 2
 
 
-def test_what_comes_after_the_first_result_counts_for_nothing():
+def test_only_the_first_result_of_a_job_counts():
     scheduler, _toys, _ = crew_of([1.0, 20.0])
     assert scheduler.all(work(*range(8))) == [n**2 for n in range(8)]
     assert scheduler.all(work(*range(40))) == [n**2 for n in range(40)]
     assert sum(scheduler.done.values()) == 48
 
 
-def test_who_joins_later_gets_work():
+def test_a_worker_that_joins_later_gets_jobs():
     scheduler, toys, _ = crew_of([1.0, 1.0])
     later = [toys.coming.pop()]
     toys.report = lambda worker, job: (
@@ -124,14 +124,14 @@ def test_who_joins_later_gets_work():
     assert {number for number, _ in toys.begun} == {0, 1}
 
 
-def test_an_error_of_the_work_is_raised_and_not_repeated():
+def test_an_error_of_a_job_is_raised_and_not_retried():
     scheduler, toys, _ = crew_of([1.0], fate=lambda worker: UserError("no such creature"))
     with pytest.raises(UserError, match="no such creature"):
         scheduler.all(work(1))
     assert len(toys.begun) == 1
 
 
-def test_work_that_goes_on_comes_before_what_has_not_begun():
+def test_continued_jobs_come_before_new_ones():
     scheduler, _toys, _ = crew_of([1.0])
     for number in (1, 2):
         scheduler.submit(number, lambda number=number: (None, number))
@@ -140,7 +140,7 @@ def test_work_that_goes_on_comes_before_what_has_not_begun():
     assert [scheduler.next(lambda: False) for _ in range(2)] == [(1, 100), (2, 4)]
 
 
-def test_work_is_made_when_somebody_is_there_to_do_it():
+def test_a_job_is_created_only_when_a_worker_is_idle():
     scheduler, _toys, _ = crew_of([1.0])
     made = []
     for number in range(3):
@@ -149,12 +149,12 @@ def test_work_is_made_when_somebody_is_there_to_do_it():
     assert made == [0]
 
 
-def test_told_to_stop_it_stops():
+def test_the_scheduler_stops_on_request():
     scheduler, _, _ = crew_of([1.0])
     assert scheduler.all(work(1), stopped=lambda: True) is None
 
 
-def test_that_nobody_is_there_is_said_once():
+def test_missing_workers_are_reported_once():
     scheduler, toys, said = crew_of([])
     scheduler.submit(0, lambda: (None, 0))
     assert scheduler.next(lambda: toys.clock.now > 500) is None
@@ -162,8 +162,8 @@ def test_that_nobody_is_there_is_said_once():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_whatever_is_lost_every_result_comes_exactly_once(seed: int):
-    """Six hundred pieces, thirty workers of all speeds, every ninth of which is lost with its work."""
+def test_every_result_comes_exactly_once_despite_lost_workers(seed: int):
+    """600 jobs on 30 workers of all speeds; every ninth job loses its worker."""
     chance, hired = random.Random(seed), []
     seconds = [chance.choice([1.0, 1.0, 2.0, 30.0]) for _ in range(30)]
 

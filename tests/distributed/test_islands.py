@@ -1,6 +1,6 @@
-"""Populations that exchange their best, in this process: the same work as on a cluster, one hand.
+"""Islands that exchange their best, in this process: the work of a cluster on one worker.
 
-Nothing is simulated here; `test_blocks` simulates what a worker does.
+Nothing is simulated here; `test_blocks` simulates a worker's part.
 """
 
 import io
@@ -42,7 +42,7 @@ def config(**of_islands: Any):
 
 
 class Interrupted(Scheduler):
-    """One that is told to stop after so many pieces of work."""
+    """A scheduler that stops after `left` jobs."""
 
     left = 4
 
@@ -76,7 +76,7 @@ def without_times(path: Path) -> list[dict]:
     return [{k: v for k, v in line.items() if k not in timed} for line in lines]
 
 
-def test_the_folder_is_that_of_a_run_and_has_each_islands_own(finished: Path, stool: Creature):
+def test_the_run_folder_contains_each_islands_folder(finished: Path, stool: Creature):
     lines = read_metrics(finished / "metrics.jsonl")
     assert [line["generation"] for line in lines] == list(range(6))
     each = [read_metrics(finished / "islands" / str(i) / "metrics.jsonl") for i in range(3)]
@@ -89,12 +89,12 @@ def test_the_folder_is_that_of_a_run_and_has_each_islands_own(finished: Path, st
         assert stored_generations(finished / "islands" / str(i))[-1] == 5
 
 
-def test_islands_begin_apart_on_the_same_starts(finished: Path):
+def test_islands_begin_with_different_populations_on_the_same_starts(finished: Path):
     first = [read_metrics(finished / f"islands/{i}/metrics.jsonl")[0]["best"] for i in range(3)]
     assert len(set(first)) == 3
 
 
-def test_the_first_island_begins_as_the_run_without_islands(
+def test_the_first_island_begins_like_a_run_without_islands(
     finished: Path, tmp_path: Path, stool: Creature
 ):
     assert run(tmp_path / "one", stool, config(count=1))
@@ -103,7 +103,7 @@ def test_the_first_island_begins_as_the_run_without_islands(
     assert not exchanges(tmp_path / "one")
 
 
-def test_each_exchange_is_told(finished: Path):
+def test_each_exchange_is_logged(finished: Path):
     told = exchanges(finished)
     assert [(line["generation"], line["from"], line["to"]) for line in told] == [
         (generation, (to - 1) % 3, to) for generation in (2, 4) for to in range(3)
@@ -112,13 +112,13 @@ def test_each_exchange_is_told(finished: Path):
     assert told[1]["fitness"] == [pytest.approx(best[2])]
 
 
-def test_what_arrives_is_there_in_the_next_generation(finished: Path):
+def test_migrants_are_present_in_the_next_generation(finished: Path):
     sent = next(line for line in exchanges(finished) if line["to"] == 1)
     after = read_metrics(finished / "islands/1/metrics.jsonl")[3]
     assert after["best"] >= sent["fitness"][0]
 
 
-def test_stopped_between_exchanges_it_goes_on_to_the_same_champion(
+def test_a_run_stopped_between_exchanges_reaches_the_same_champion(
     finished: Path, tmp_path: Path, stool: Creature
 ):
     folder = tmp_path / "stopped"
@@ -130,7 +130,7 @@ def test_stopped_between_exchanges_it_goes_on_to_the_same_champion(
     assert (folder / "champion.json").read_text() == (finished / "champion.json").read_text()
 
 
-def test_without_exchanges_they_are_runs_of_their_own(
+def test_without_exchanges_islands_are_independent_runs(
     finished: Path, tmp_path: Path, stool: Creature
 ):
     folder = tmp_path / "apart"
@@ -142,9 +142,7 @@ def test_without_exchanges_they_are_runs_of_their_own(
     assert apart[3:] != together[3:]
 
 
-def test_inspect_tells_each_island_and_what_came_to_it(
-    finished: Path, capsys: pytest.CaptureFixture
-):
+def test_inspect_lists_each_island_and_its_migrants(finished: Path, capsys: pytest.CaptureFixture):
     said = said_by(capsys, "inspect", finished, code=0)
     assert "how many migrants came to each" in said
     rows = island_facts(finished, 5)
@@ -161,7 +159,7 @@ def test_inspect_tells_each_island_and_what_came_to_it(
     assert island_facts(finished, 2)[0]["arrived"] == 0
 
 
-def test_they_are_run_from_python_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_islands_run_from_python_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     ran = []
     monkeypatch.setattr(
         islands, "train", lambda folder, creature, config, *others: ran.append(config)

@@ -1,4 +1,4 @@
-"""What islands exchange and what they are together, on states made up by hand."""
+"""Exchanges between islands and their joint result, on made-up states."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from mjxgait.training.checkpoint import Packed
 
 
 def island(*fitness: float) -> Packed:
-    """A population whose genomes tell who is who: [fitness, fitness + 100]."""
+    """A population with genomes that identify the individual: [fitness, fitness + 100]."""
     values = np.array(fitness, np.float32)
     return Packed(
         {
@@ -33,12 +33,12 @@ def fitness(states: list[Packed]) -> list[list[float]]:
     return [state.arrays["fitness"].tolist() for state in states]
 
 
-def test_along_a_ring_the_best_go_to_the_next_in_the_place_of_its_worst():
+def test_in_a_ring_the_best_replace_the_worst_of_the_next_island():
     went = exchanged(THREE, IslandsConfig(count=3, migrants=2))
     assert fitness(went) == [[9, 7, 6, 5], [9, 8, 5, 4], [8, 7, 6, 4]]
 
 
-def test_each_brings_all_that_is_its_own_and_nothing_else_changes():
+def test_migrants_bring_all_their_data_and_nothing_else_changes():
     for before, after in zip(THREE, exchanged(THREE, IslandsConfig(count=3)), strict=True):
         assert (
             after.arrays["genomes.poses"][:, 1].tolist() == (after.arrays["fitness"] + 100).tolist()
@@ -48,12 +48,12 @@ def test_each_brings_all_that_is_its_own_and_nothing_else_changes():
             assert (after.arrays[name] == before.arrays[name]).all()
 
 
-def test_among_all_each_gets_the_best_of_every_other_but_half_stays():
+def test_topology_all_brings_the_best_of_every_island_but_half_stays():
     went = exchanged(THREE, IslandsConfig(count=3, migrants=2, topology="all"))
     assert fitness(went) == [[9, 8, 7, 5], [9, 8, 7, 4], [9, 8, 7, 6]]
 
 
-def test_who_could_not_be_judged_is_the_worst():
+def test_a_nonfinite_individual_is_the_worst():
     went = exchanged([island(1, np.nan), island(3, 2)], IslandsConfig(count=2, migrants=1))
     assert fitness(went) == [[3, 1], [3, 1]]
 
@@ -62,7 +62,7 @@ def at(level: int, state: Packed) -> Packed:
     return state.with_arrays({"level": np.int32(level)})
 
 
-def test_nobody_comes_who_was_judged_on_milder_trials():
+def test_no_migrants_from_islands_with_milder_trials():
     ahead, behind = at(3, island(2, 1)), at(2, island(9, 8))
     went = exchanged([ahead, behind], IslandsConfig(count=2, migrants=1))
     assert fitness(went) == [[2, 1], [9, 2]]
@@ -70,19 +70,19 @@ def test_nobody_comes_who_was_judged_on_milder_trials():
     assert fitness(same) == [[9, 2], [9, 2]]
 
 
-def test_together_those_count_whose_trials_are_the_hardest():
+def test_only_islands_with_the_hardest_trials_are_gathered():
     best = gathered([at(3, island(2, 1)), at(2, island(9, 8))])
     assert best.arrays["fitness"].tolist() == [2, 1]
     assert best.arrays["level"] == 3
 
 
-def test_together_they_are_one_population_of_the_best():
+def test_islands_are_gathered_into_one_population_of_the_best():
     best = gathered(THREE)
     assert best.arrays["fitness"].tolist() == [9, 8, 7, 6]
     assert best.arrays["genomes.poses"][:, 0].tolist() == [9, 8, 7, 6]
 
 
-def test_all_else_is_that_of_the_island_with_the_best():
+def test_other_data_come_from_the_island_with_the_best():
     lowly = island(1, 0)
     assert (gathered([lowly, THREE[0]]).arrays["key"] == THREE[0].arrays["key"]).all()
 
@@ -92,7 +92,7 @@ LINE |= dict.fromkeys(("median", "lower_quartile", "upper_quartile", "spread"), 
 LINE |= {"generation": 3, "unique": 4, "forced": False, "wall_s": 2.0, "worst": -1.0}
 
 
-def test_their_line_counts_all_and_has_the_best_ones_terms():
+def test_the_joint_line_counts_all_and_has_the_terms_of_the_best():
     one = LINE | {"best": 1.0, "mean": 0.0, "term_slip": 0.1}
     other = LINE | {"best": 2.0, "mean": 1.0, "term_slip": 0.2, "forced": True, "wall_s": 4.0}
     line = together([one, other | {"worst": -7.0}], 4.0)
@@ -102,12 +102,12 @@ def test_their_line_counts_all_and_has_the_best_ones_terms():
     assert (line["wall_s"], line["steps_per_second"]) == (4.0, 5)
 
 
-def test_islands_that_take_turns_take_the_time_of_all_without_compiling():
+def test_the_time_of_islands_in_turn_is_their_sum_without_compilation():
     one, other = LINE | {"best": 1.0, "mean": 0.0}, LINE | {"best": 2.0, "mean": 1.0}
     assert together([one, other], 30.0)["wall_s"] == 4.0
 
 
-def test_an_island_where_nobody_could_be_judged_does_not_lead():
+def test_an_island_without_finite_fitness_does_not_lead():
     nobody = LINE | {"best": None, "mean": None, "worst": None}
     line = together([nobody, LINE | {"best": -3.0, "mean": -4.0}], 4.0)
     assert (line["best"], line["mean"], line["worst"], line["island"]) == (-3.0, -4.0, -1.0, 1)
@@ -117,6 +117,6 @@ def test_an_island_where_nobody_could_be_judged_does_not_lead():
     ("count", "topology", "sources"),
     [(1, "ring", []), (1, "all", []), (3, "ring", [[2], [0], [1]]), (2, "all", [[1], [0]])],
 )
-def test_who_sends_to_whom(count: int, topology: str, sources: list):
+def test_sources_of_each_topology(count: int, topology: str, sources: list):
     config = IslandsConfig(count=count, topology=topology)
     assert [config.sources(i) for i in range(count)] == (sources or [[]])

@@ -1,4 +1,4 @@
-"""On a real cluster of Ray: machines of one core each, simulated on this one, some of which are lost."""
+"""A real Ray cluster of simulated machines with one core each, some of which are lost."""
 
 import importlib.util
 import os
@@ -64,7 +64,7 @@ def plan(stool: Creature) -> Plan:
 
 
 def results(folder: Path) -> dict[str, str]:
-    """All that a study leaves, by name; of each log the lines."""
+    """The logs and champions that a study leaves, by path."""
     paths = [*folder.glob("groups/*/metrics.jsonl"), *folder.glob("champions/*.json")]
     return {str(path.relative_to(folder)): path.read_text() for path in paths}
 
@@ -72,7 +72,7 @@ def results(folder: Path) -> dict[str, str]:
 def study(
     folder: Path, stool: Creature, plan: Plan, address: str, at_first: Callable[[], Any] = bool
 ) -> list[str]:
-    """Runs a study; what the cluster said. at_first: called when the first result has come."""
+    """Run a study and return the cluster's messages. at_first: called at the first result."""
     said: list[str] = []
     todo = [at_first]
 
@@ -89,7 +89,7 @@ def study(
 def alone(
     simulated: Any, stool: Creature, plan: Plan, tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, str]:
-    """What one machine makes of the study."""
+    """The results of the study on one machine."""
     folder = tmp_path_factory.mktemp("study") / "alone"
     study(folder, stool, plan, simulated.address)
     found = results(folder)
@@ -104,10 +104,10 @@ def wait_until(true: Callable[[], Any], seconds: float = 240) -> None:
         time.sleep(0.05)
 
 
-def test_two_machines_make_the_same_to_the_bit_whatever_is_lost_and_joins(
+def test_machines_that_leave_and_join_do_not_change_a_bit_of_the_results(
     simulated: Any, alone: dict[str, str], stool: Creature, plan: Plan, tmp_path: Path
 ):
-    """One loses its plug, the other its worker, and a third joins."""
+    """One machine loses power, the other its worker, and a third joins."""
     second = simulated.add()
 
     def happen() -> None:
@@ -123,10 +123,10 @@ def test_two_machines_make_the_same_to_the_bit_whatever_is_lost_and_joins(
     assert any("a worker is lost" in line for line in said)
 
 
-def test_interrupted_killed_and_resumed_a_study_ends_the_same_and_leaves_nobody(
+def test_a_study_killed_and_resumed_ends_the_same_and_leaves_no_workers(
     simulated: Any, alone: dict[str, str], stool: Creature, plan: Plan, tmp_path: Path
 ):
-    """Ctrl-C to the command, then a kill of it, then the rest on two machines instead of one."""
+    """Ctrl-C, then a kill of the command, then the rest on two machines instead of one."""
     folder, file = tmp_path / "study", tmp_path / "study.toml"
     file.write_text(dump_toml(STUDY))
     mjxgait = [sys.executable, "-m", "mjxgait", "ablate"]

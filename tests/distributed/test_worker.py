@@ -1,4 +1,4 @@
-"""A worker's turn to compile: one after the other where there is a cache, all at once where there is none."""
+"""Workers compile a program one after the other with a cache, and all at once without."""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -21,7 +21,7 @@ def cache(tmp_path: Path) -> Iterator[Path]:
 
 
 def another_takes(name: str) -> bool:
-    """Whether somebody else could compile this now."""
+    """Whether another worker could compile this now."""
 
     def take() -> bool:
         try:
@@ -41,7 +41,7 @@ def test_while_one_compiles_a_program_the_others_wait(cache: Path):
     assert another_takes("walk")
 
 
-def test_where_nothing_can_be_kept_nobody_waits(cache: Path):
+def test_without_a_usable_cache_no_worker_waits(cache: Path):
     cache.write_text("in the way")
     with _turn("walk"):
         assert another_takes("walk")

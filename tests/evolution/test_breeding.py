@@ -1,6 +1,4 @@
-"""Children born one after another, as in the thesis: elder ones become parents, and none is like
-another.
-"""
+"""Sequential breeding, as in the thesis: earlier children become parents, and all differ."""
 
 import dataclasses
 
@@ -31,7 +29,7 @@ THESIS = EvolutionConfig(
 
 
 def marked(config: EvolutionConfig, poses: int) -> Genome:
-    """A population in which every pose has a value of its own, from which one reads whose it is."""
+    """A population in which a unique value of each pose identifies its individual."""
     count = config.population * poses
     values = jnp.arange(count, dtype=jnp.float32).reshape(config.population, poses, 1)
     return Genome(jnp.tile(values, (1, 1, 2)), jnp.zeros((config.population, 1)))
@@ -41,7 +39,7 @@ def marked(config: EvolutionConfig, poses: int) -> Genome:
 def bear(
     settings: EvolutionConfig, key: jax.Array, adults: Genome, reach: jax.Array
 ) -> tuple[Genome, jax.Array]:
-    """Settings as inputs, as in a run: what differs in numbers only is compiled once."""
+    """Settings are inputs, as in a run: settings that differ only in numbers compile once."""
     low = jnp.zeros(adults.key_poses.shape[1:])
     box = Box(Genome(low, jnp.zeros(1)), Genome(low + reach, jnp.zeros(1)))
     return Nursery(settings, pose_variation(box, settings)).children(key, adults)
@@ -51,7 +49,7 @@ POSES = 3
 
 
 def born(alike: bool = False, **settings) -> tuple[Genome, Genome, jax.Array]:
-    """The adults, their children, and which of these are crossings; `alike`: of copies of one."""
+    """Adults, children and which children are crossings. alike: all adults are copies of one."""
     config = dataclasses.replace(THESIS, **settings)
     adults = marked(config, POSES)
     if alike:
@@ -63,7 +61,7 @@ def born(alike: bool = False, **settings) -> tuple[Genome, Genome, jax.Array]:
 
 
 def ancestors(children: Genome) -> list[int]:
-    """From how many adults each child has its poses."""
+    """The number of adults that each child's poses come from."""
     whose = np.asarray(children.key_poses[..., 0]).astype(int) // POSES
     return [len(set(row)) for row in whose]
 
@@ -73,35 +71,33 @@ def together(adults: Genome, children: Genome) -> Genome:
 
 
 def test_children_of_a_growing_pool_are_parents_too():
-    """Two adults have poses of two adults' at most; a third one's come through an elder child."""
+    """Two adults give poses of two adults at most; a third's come through an earlier child."""
     _, children, crossed = born()
     assert crossed.all()
     assert ancestors(children)[0] <= 2
     assert max(ancestors(children)) == 3
 
 
-def test_otherwise_parents_are_adults():
+def test_without_a_growing_pool_parents_are_adults():
     _, children, _ = born(pool="parents")
     assert max(ancestors(children)) <= 2
 
 
 @pytest.mark.parametrize("pool", ["parents", "growing"])
-def test_no_child_is_like_an_adult_or_a_sibling(pool: str):
-    """Four adults of three poses, each in its place, have 36 children of two that are not themselves;
-    20 are asked for.
-    """
+def test_no_child_equals_an_adult_or_a_sibling(pool: str):
+    """Aligned crossing of four adults with three poses has 36 new children; 20 are requested."""
     adults, children, crossed = born(pool=pool, crossing="align")
     assert crossed.sum() > 10
     assert first_occurrence(together(adults, children)).all()
 
 
-def test_without_that_there_are_copies():
+def test_without_unique_children_there_are_copies():
     adults, children, _ = born(crossing="align", unique_children=False)
     assert not first_occurrence(together(adults, children)).all()
 
 
-def test_where_no_child_would_be_new_it_is_a_mutant():
-    """Adults that are copies of one, each pose in its place, can only have it again."""
+def test_a_child_is_mutated_where_no_crossing_is_new():
+    """Aligned crossing of identical adults can only repeat them."""
     adults, children, crossed = born(alike=True, crossing="align", pool="parents")
     assert not crossed.any()
     one = jax.tree.map(lambda leaf: leaf[:1], adults)

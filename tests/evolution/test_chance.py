@@ -1,4 +1,4 @@
-"""The generator behind all draws: as even and as independent as chance is."""
+"""The random number generator: its draws are uniform and independent."""
 
 import itertools
 from functools import partial
@@ -14,7 +14,7 @@ from mjxgait.evolution.chance import NAME, key_from, key_of
 
 MANY = 1 << 18
 UNLIKELY = 1e-6
-"""A generator that is right fails a test so rarely."""
+"""Probability that a correct generator fails a test."""
 
 
 def bits_of(key: jax.Array, count: int = MANY) -> np.ndarray:
@@ -22,7 +22,7 @@ def bits_of(key: jax.Array, count: int = MANY) -> np.ndarray:
 
 
 def shares(bits: np.ndarray) -> np.ndarray:
-    """From 0 to 1."""
+    """The bits as numbers from 0 to 1."""
     return (bits.astype(np.float64) + 0.5) / 2**32
 
 
@@ -37,7 +37,7 @@ STREAMS = {
         jax.vmap(lambda key: jax.random.split(key, 1)[0])(jax.random.split(key_of(3), MANY))
     ),
 }
-"""Ways in which evolution comes by numbers that must have nothing to do with each other."""
+"""Ways in which evolution draws numbers that must be independent."""
 
 
 def bits_of_each(keys: jax.Array) -> np.ndarray:
@@ -50,7 +50,7 @@ def stream(request: pytest.FixtureRequest) -> np.ndarray:
 
 
 @pytest.mark.parametrize("shift", [0, 8, 16, 24])
-def test_every_byte_is_even(stream: np.ndarray, shift: int):
+def test_every_byte_is_uniform(stream: np.ndarray, shift: int):
     assert stats.chisquare(np.bincount((stream >> shift) & 255, minlength=256)).pvalue > UNLIKELY
 
 
@@ -59,7 +59,7 @@ def test_the_shares_are_uniform(stream: np.ndarray):
 
 
 @pytest.mark.parametrize("apart", [1, 2, 3, 64, 256])
-def test_neighbours_know_nothing_of_each_other(stream: np.ndarray, apart: int):
+def test_neighbours_are_uncorrelated(stream: np.ndarray, apart: int):
     assert stats.pearsonr(shares(stream)[:-apart], shares(stream)[apart:]).pvalue > UNLIKELY
 
 
@@ -68,14 +68,14 @@ def test_pairs_of_neighbours_fill_the_square(stream: np.ndarray):
     assert stats.chisquare(np.bincount(cells, minlength=1024)).pvalue > UNLIKELY
 
 
-def test_as_many_values_come_twice_as_by_chance():
+def test_values_repeat_as_often_as_by_chance():
     firsts = STREAMS["the first of many children"]() >> 4
     twice, expected = MANY - len(np.unique(firsts)), MANY**2 / 2 / 2**28
     assert abs(twice - expected) < 6 * np.sqrt(expected)
 
 
 @pytest.mark.parametrize("place", range(0, 64, 7))
-def test_a_changed_bit_of_the_key_changes_half_of_the_draws_bits(place: int):
+def test_flipping_a_key_bit_flips_half_of_the_drawn_bits(place: int):
     key = jax.random.key_data(key_of(5))
     other = key.at[place // 32].set(key[place // 32] ^ jnp.uint32(1 << place % 32))
     a, b = (bits_of(key_from(data, NAME, "here"), 4096) for data in (key, other))
@@ -83,7 +83,7 @@ def test_a_changed_bit_of_the_key_changes_half_of_the_draws_bits(place: int):
     assert np.all(np.abs(flipped - 0.5) < 6 * 0.5 / 64)
 
 
-def test_the_uses_of_a_key_are_apart():
+def test_different_uses_of_a_key_draw_different_numbers():
     key = key_of(6)
     draws = [
         bits_of(key, 64),
@@ -108,14 +108,14 @@ def test_every_bit_of_a_seed_and_of_a_folded_number_counts(seed: int):
         assert len(np.unique(jax.random.key_data(keys), axis=0)) == 33
 
 
-def test_a_lane_draws_what_it_draws_alone():
+def test_a_lane_draws_the_same_alone_and_in_a_batch():
     keys = jax.random.split(key_of(7), 5)
     together = jax.vmap(lambda key: jax.random.normal(key, (3,)))(keys)
     alone = jnp.stack([jax.random.normal(key, (3,)) for key in keys])
     assert np.array_equal(together, alone)
 
 
-def test_what_was_begun_with_another_generator_is_refused():
+def test_a_checkpoint_of_another_generator_is_refused():
     data = jax.random.key_data(key_of(0))
     with pytest.raises(UserError, match=r"checkpoint 3: begun with .* threefry2x32"):
         key_from(data, "threefry2x32", "checkpoint 3")

@@ -36,16 +36,17 @@ from mjxgait.evolution.variation import Box, Variation, first_occurrence
 from mjxgait.types import Evaluation, pytree
 
 FORCED, NEVER = ForcedConfig(window=2), ForcedConfig(window=2, enabled=False)
-"""Both look two generations back: the length is in the shape of the program."""
+"""The same window of two generations: its length shapes the program."""
 K, J = 2, 3
 BOX = Box(Genome(-jnp.ones((K, J)), jnp.zeros(1)), Genome(jnp.ones((K, J)), jnp.zeros(1)))
 
 
 @pytree
 class Problem:
-    """The centre is the best, the higher the slope the more; no value where the first gene is out of
-    the limits. Of a silent genome only the first gene does anything. A cost is that of each pose
-    whose first gene is positive.
+    """Toy fitness with its maximum at the centre, or NaN where the first gene is out of limits.
+
+    slope: weight of the distance. cost: price of each pose with a positive first gene. silent: only
+    the first gene counts.
     """
 
     slope: float = 1.0
@@ -73,7 +74,7 @@ def near_zero(genomes: Genome) -> jax.Array:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Toy(Evolution):
-    """An evolution with a judge of its own."""
+    """An evolution with its own evaluation."""
 
     problem: Problem
 
@@ -83,7 +84,7 @@ class Toy(Evolution):
     def step_and_births(
         self, state: EvolutionState
     ) -> tuple[EvolutionState, GenerationMetrics, Genome]:
-        """The next state, what there is to tell, and who was born."""
+        """The next state, its metrics and the offspring."""
         proposal = self.propose(state)
         terms = self.problem.value(proposal.offspring)[:, None, None]
         evaluation = Evaluation(
@@ -102,7 +103,7 @@ def toy(problem: Problem = CENTRE, **settings) -> Toy:
 
 
 def made(config: EvolutionConfig, problem: Problem) -> Toy:
-    """From settings, plain or traced."""
+    """A toy from settings, plain or traced."""
 
     def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
         return jnp.where(jnp.isfinite(terms[..., 0, 0]), terms[..., 0, 0], -jnp.inf)
@@ -112,7 +113,7 @@ def made(config: EvolutionConfig, problem: Problem) -> Toy:
 
 
 def inputs(toy: Toy) -> tuple[EvolutionConfig, Problem]:
-    """What the programs below read, as in a run: toys that differ in numbers only share one."""
+    """Inputs of the programs below; toys that differ only in numbers share them, as runs do."""
     return traced(Config(evolution=toy.config)).evolution, toy.problem
 
 
@@ -129,7 +130,7 @@ def advance(
 
 
 def begun(evolution: Toy, seed: int = 0, has_curriculum: bool = False) -> EvolutionState:
-    """The first state; `has_curriculum`: of a task whose trials may become harder, and have not yet."""
+    """The first state. has_curriculum: its task's trials may become harder later."""
     state: EvolutionState = begin(*inputs(evolution), key_of(seed))
     if not has_curriculum:
         return state
@@ -173,7 +174,7 @@ def test_the_best_of_old_and_new_survive():
     assert not np.allclose(state.fitness, best)
 
 
-def test_of_the_parents_only_the_best_lives_on_if_children_take_their_place():
+def test_only_the_best_parent_survives_when_children_replace_parents():
     replacing = toy(survival="children", remove_duplicates=False, crossover=0.9, forced=NEVER)
     history = run(replacing, 12)
     for (before, _), (after, _) in itertools.pairwise(history):
@@ -185,8 +186,8 @@ def test_of_the_parents_only_the_best_lives_on_if_children_take_their_place():
     )
 
 
-def test_the_elite_is_judged_once_more():
-    """Whoever lives on does so with the verdict of the latest judge, and nobody else does."""
+def test_the_elite_is_evaluated_again():
+    """Only the elite survives, with the fitness of its latest evaluation."""
     keeping = toy(survival="children", elite=0.15, forced=NEVER)
     (before, _), settings = run(keeping, 4)[-1], inputs(keeping)[0]
     after, _, births = jax.device_get(advance(settings, Problem(slope=2.0), before))
@@ -209,8 +210,8 @@ REMEMBERING = {
 }
 
 
-def test_an_elite_that_remembers_is_worth_the_mean_of_its_rounds():
-    """Children have had one round; in the mean every round counts the same."""
+def test_remembered_elite_fitness_is_the_mean_of_its_rounds():
+    """Children have one round; all rounds have the same weight."""
     keeping = toy(**REMEMBERING)
     settings, before = inputs(keeping)[0], run(keeping, 4)[-1][0]
     for slope in (2.0, 6.0):
@@ -230,8 +231,8 @@ def test_an_elite_that_remembers_is_worth_the_mean_of_its_rounds():
 
 
 @pytest.mark.parametrize("stale", [True, False])
-def test_all_are_judged_again_once_trials_have_become_harder(stale: bool):
-    """Then nobody lives on by an old verdict, and else nobody is judged twice."""
+def test_all_parents_are_evaluated_again_after_trials_become_harder(stale: bool):
+    """Then no old result survives; otherwise no individual is evaluated twice."""
     climbing = toy(forced=NEVER, growth=3.0)
     (before, _), settings = run(climbing, 4, has_curriculum=True)[-1], inputs(climbing)[0]
     before = dataclasses.replace(before, level=jnp.int32(1), stale=jnp.asarray(stale))
@@ -249,8 +250,8 @@ def test_all_are_judged_again_once_trials_have_become_harder(stale: bool):
 SPARING = {"growth": 3.0, "forced": NEVER, "family": 0.25, "rivals": 4}
 
 
-def test_no_family_takes_more_than_its_share():
-    """Mother by mother from one of the first generation; and the best are still the best."""
+def test_no_lineage_exceeds_its_share():
+    """A lineage follows the mothers to the first generation. The best fitness still never falls."""
     history = run(toy(**SPARING), 25)
     plain = run(toy(growth=3.0, forced=NEVER), 25, has_curriculum=True)
     for (before, _), (after, told) in itertools.pairwise(history):
@@ -265,8 +266,8 @@ def test_no_family_takes_more_than_its_share():
 
 
 @pytest.mark.parametrize("elite", [0.0, 0.25])
-def test_no_family_takes_more_than_its_share_where_parents_die(elite: float):
-    """Where others have too few children, their old ones stay."""
+def test_no_lineage_exceeds_its_share_when_parents_die(elite: float):
+    """If other lineages have too few children, their parents stay."""
     sparing = toy(
         **SPARING, survival="children", elite=elite, selection="tournament", mutation_rate=0.3
     )
@@ -275,14 +276,14 @@ def test_no_family_takes_more_than_its_share_where_parents_die(elite: float):
         assert len(np.unique(state.genomes.key_poses, axis=0)) == 20
 
 
-def test_of_a_family_the_best_come_first():
+def test_place_in_lineage_follows_rank():
     family = jnp.array([7, 7, 3, 7, 3, 7])
     rank = jnp.array([5, 1, 3, 2, 4, 0])
     counts = jnp.array([True, True, True, True, True, False])
     assert place_in_family(family, rank, counts).tolist() == [2, 0, 0, 1, 1, 0]
 
 
-def test_newcomers_begin_families_of_their_own():
+def test_each_immigrant_starts_a_lineage():
     state = dataclasses.replace(begun(toy(**SPARING)), family=jnp.arange(20) // 2)
     mothers = jnp.array([4, NOBODY, 5, NOBODY])
     old, new = np.split(np.asarray(families(state, mothers)), [20])
@@ -292,8 +293,8 @@ def test_newcomers_begin_families_of_their_own():
     assert families(dataclasses.replace(state, family=None), mothers) is None
 
 
-def test_what_a_genome_costs_is_taken_from_its_fitness():
-    """Half of the genes cost as much as their squares are worth, so the others decide."""
+def test_genome_cost_is_subtracted_from_fitness():
+    """A positive first gene costs 3, the most that a pose can lose by its squares; none remains."""
     dear = toy(Problem(cost=3.0), crossover=0.5)
     for state, _ in run(dear, 12):
         expected = near_zero(state.genomes) - dear.problem.price(state.genomes)
@@ -301,8 +302,8 @@ def test_what_a_genome_costs_is_taken_from_its_fitness():
     assert not np.asarray(dear.problem.price(state.genomes)).any()
 
 
-def test_no_verdict_of_an_earlier_judge_counts():
-    """Parents fill the places for which there are no children; nobody has judged them now."""
+def test_earlier_results_do_not_count():
+    """Parents fill the places without children; they have no new evaluation, so no fitness."""
     keeping = toy(survival="children", elite=0.15, forced=NEVER, growth=1.5)
     (before, _), settings = run(keeping, 4)[-1], inputs(keeping)[0]
     at_level = jax.device_get(advance(settings, Problem(slope=2.0), before))[0]
@@ -319,8 +320,8 @@ def test_the_population_is_sorted_and_without_duplicates():
         assert int(metrics.unique) == 20
 
 
-def test_of_a_verdict_only_one_survives_if_that_makes_a_duplicate():
-    """Genomes of which much does nothing are copies of each other that no look at them finds."""
+def test_only_one_individual_per_result_survives_if_same_is_verdict():
+    """Genomes that differ only in silent genes behave as copies."""
     crowd = {"growth": 3.0, "forced": NEVER}
     plain, _ = run(toy(SILENT, **crowd), 12, has_curriculum=True)[-1]
     state, told = run(toy(SILENT, **crowd, same="verdict"), 12, has_curriculum=True)[-1]
@@ -329,8 +330,8 @@ def test_of_a_verdict_only_one_survives_if_that_makes_a_duplicate():
     assert len(np.unique(state.fitness)) == 20
 
 
-def test_of_a_verdict_the_youngest_survives():
-    """So what does nothing drifts, and may do something one day."""
+def test_the_youngest_of_equal_results_survives():
+    """Silent genes therefore drift, and may become useful later."""
     drifting = toy(SILENT, forced=NEVER, growth=3.0, same="verdict")
     before = run(drifting, 4, has_curriculum=True)[-1][0]
     after, _, births = jax.device_get(advance(*inputs(drifting), before))
@@ -340,10 +341,8 @@ def test_of_a_verdict_the_youngest_survives():
     assert (after.born[known] == after.generation).all()
 
 
-def test_the_same_verdict_is_that_of_one_round():
-    """One of the elite has the mean of all of its rounds, and its copies have not: only one of them
-    survives all the same.
-    """
+def test_results_are_compared_within_one_round():
+    """An elite has the mean of its rounds and its copies have not; still only one survives."""
     keeping = toy(SILENT, **REMEMBERING)
     before, settings = run(keeping, 4)[-1][0], inputs(keeping)[0]
     after, _, _ = jax.device_get(advance(settings, Problem(slope=6.0, silent=True), before))
@@ -353,8 +352,8 @@ def test_the_same_verdict_is_that_of_one_round():
 
 
 @pytest.mark.parametrize("stale", [True, False])
-def test_by_verdict_too_nobody_lives_on_by_an_old_one(stale: bool):
-    """Trials have become harder, and too few come to different verdicts to fill the population."""
+def test_no_old_result_survives_harder_trials_if_same_is_verdict(stale: bool):
+    """Trials have become harder, and too few results differ to fill the population."""
     climbing = toy(SILENT, forced=NEVER, growth=3.0, same="verdict")
     (before, _), settings = run(climbing, 4, has_curriculum=True)[-1], inputs(climbing)[0]
     before = dataclasses.replace(before, level=jnp.int32(1), stale=jnp.asarray(stale))
@@ -365,8 +364,10 @@ def test_by_verdict_too_nobody_lives_on_by_an_old_one(stale: bool):
     np.testing.assert_allclose(after.terms[:, 0, 0], terms, rtol=1e-6)
 
 
-def test_of_a_verdict_who_costs_the_same_comes_first_and_who_has_none_never_does():
-    """Two old ones and two children, that all do the same; a child that is dearer is another kind."""
+def test_first_of_kind_compares_result_and_cost():
+    """Two parents and two children with equal results: a costlier child is another kind, and a
+    child without a result is never first.
+    """
     poses, number = jnp.zeros((2, K, J)), jnp.zeros(2, jnp.int32)
     state = dataclasses.replace(
         begun(toy()), genomes=Genome(poses, jnp.zeros((2, 1))), terms=jnp.zeros((2, 1, 1))
@@ -394,7 +395,7 @@ def test_duplicates_fill_the_population_when_they_may_stay():
 
 
 @pytest.mark.parametrize("growth", [1.2, 2.0, 3.0])
-def test_everybody_of_the_initial_population_is_judged_before_generation_zero(growth: float):
+def test_the_initial_population_is_evaluated_before_generation_zero(growth: float):
     evolution = toy(growth=growth)
     created = begun(evolution)
     first = run(evolution, 1, has_curriculum=growth == 3.0)[0][0]
@@ -404,7 +405,7 @@ def test_everybody_of_the_initial_population_is_judged_before_generation_zero(gr
 
 
 @pytest.mark.parametrize("growth", [1.2, 2.0, 3.0])
-def test_the_first_generation_is_the_best_of_as_many_candidates_as_asked_for(growth: float):
+def test_the_first_generation_is_the_best_of_the_requested_candidates(growth: float):
     plain, choosy = toy(growth=growth), toy(growth=growth, initial_choice=4)
     has_curriculum = growth == 3.0
     rounds, first = [], begun(choosy, has_curriculum=has_curriculum)
@@ -420,7 +421,7 @@ def test_the_first_generation_is_the_best_of_as_many_candidates_as_asked_for(gro
     )
 
 
-def test_an_individual_that_cannot_be_judged_loses_and_poisons_nobody():
+def test_a_nonfinite_individual_loses_and_affects_no_other():
     for state, metrics in run(toy(Problem(highest=0.3)), 10)[1:]:
         assert np.isfinite(state.fitness).all()
         assert np.isfinite(metrics.mean)
@@ -433,7 +434,7 @@ def test_a_population_without_one_good_individual_recovers():
     assert np.isfinite(history[-1][1].best)
 
 
-def test_stagnation_starts_a_spell_that_refreshes_and_ends():
+def test_stagnation_starts_a_forced_phase_that_refreshes_and_ends():
     forced = ForcedConfig(window=2, newcomers=0.25, refresh=0.5, limit=2, patience=0)
     history = run(toy(FLAT, forced=forced), 16)
     flags = [bool(metrics.forced) for _, metrics in history]
@@ -454,14 +455,14 @@ def lengths_of_spells(history: list[tuple[EvolutionState, GenerationMetrics]]) -
 
 
 @pytest.mark.parametrize(("limit", "length"), [(3, 3), (0, 5)])
-def test_without_a_limit_a_spell_lasts_until_the_population_is_refreshed(limit: int, length: int):
-    """Four a generation are taken in, 19 of 20 are to be replaced."""
+def test_a_forced_phase_lasts_until_its_limit_or_until_refreshed(limit: int, length: int):
+    """Each generation takes in four; 19 of 20 must be replaced."""
     forced = ForcedConfig(window=2, refresh=1.0, limit=limit, patience=0)
     assert lengths_of_spells(run(toy(FLAT, growth=1.2, forced=forced), 12))[0] == length
 
 
-def test_without_a_limit_a_spell_in_which_nobody_is_fit_does_not_end():
-    """Everybody begins near the best there is, and three re-drawn poses are far from it."""
+def test_a_forced_phase_without_limit_or_fit_children_does_not_end():
+    """All begin near the optimum, and three redrawn poses are far from it."""
     forced = ForcedConfig(window=2, gain=1.0, newcomers=0.0, accept=1.0, limit=0, patience=0)
     near = toy(
         forced=forced, initial_spread=0.01, mutation="pose", mutation_rate=0.0, crossover=1.0
@@ -471,8 +472,8 @@ def test_without_a_limit_a_spell_in_which_nobody_is_fit_does_not_end():
     assert spells[0] > 12
 
 
-def test_the_log_tells_whose_child_each_is():
-    """Mutants of one joint: nobody else in a population is as like to them as their mother."""
+def test_the_log_names_each_individuals_mother():
+    """Mutants of one joint resemble their mother more than any other individual."""
     following = toy(crossover=0.0, mutation="single", forced=NEVER)
     history, children = run(following, 12), 0
     assert (history[0][1].mothers == NOBODY).all()
@@ -487,7 +488,7 @@ def test_the_log_tells_whose_child_each_is():
     assert history[0][1].mothers.shape == (20,)
 
 
-def test_a_growing_pool_evolves_and_simulates_nobody_twice():
+def test_a_growing_pool_evolves_and_simulates_no_genome_twice():
     settings = {"selection": "uniform", "crossing": "permute", "crossover": 1.0}
     evolution = toy(
         mutation_rate=0.0, pool="growing", unique_children=True, lineage=False, **settings
@@ -500,12 +501,12 @@ def test_a_growing_pool_evolves_and_simulates_nobody_twice():
     assert first_occurrence(everybody).all()
 
 
-def test_growth_keeps_forced_evolution_away():
+def test_no_forced_evolution_while_fitness_grows():
     forced = ForcedConfig(window=2, gain=0.0, patience=0)
     assert not any(bool(metrics.forced) for _, metrics in run(toy(forced=forced), 12))
 
 
-def test_unfit_newcomers_are_not_taken_in():
+def test_unfit_immigrants_are_rejected():
     forced = ForcedConfig(window=2, gain=10.0, newcomers=1.0, accept=1.0, patience=0)
     for (before, _), (after, metrics) in zip(
         history := run(toy(forced=forced), 12), history[1:], strict=False
@@ -515,7 +516,7 @@ def test_unfit_newcomers_are_not_taken_in():
             assert (np.asarray(after.fitness)[taken] >= float(before.fitness[0])).all()
 
 
-def test_a_forced_generation_keeps_the_parents_that_die_otherwise():
+def test_a_forced_generation_keeps_parents_that_would_otherwise_die():
     forced = ForcedConfig(window=2, gain=10.0, refresh=0.5, limit=1, patience=0)
     history = run(toy(survival="children", elite=0.15, forced=forced), 12)
     old = {
@@ -546,7 +547,7 @@ def test_a_run_stops_at_the_target_and_at_the_cap():
 
 
 @pytest.mark.parametrize("selection", ["uniform", "rank", "tournament"])
-def test_parents_are_two_and_the_better_are_drawn_more_often(selection: str):
+def test_the_two_parents_differ_and_better_ones_are_drawn_more_often(selection: str):
     mothers, fathers = parents(key_of(0), 20_000, 10, selection)
     assert (mothers != fathers).all()
     counts = np.bincount(np.asarray(mothers), minlength=10) / 20_000
@@ -565,9 +566,9 @@ def test_parents_may_be_drawn_in_proportion_to_their_fitness():
 
 
 @pytest.mark.parametrize("rivals", [1, 6])
-def test_the_best_of_more_rivals_is_better(rivals: int):
+def test_larger_tournaments_select_better_parents(rivals: int):
     mothers, _ = parents(key_of(0), 20_000, 10, "tournament", rivals)
-    # The best of n is place k or worse if all n are.
+    # The winner has rank k or worse only if all rivals do.
     worse = (1 - np.arange(11) / 10) ** rivals
     assert np.bincount(mothers, minlength=10) / 20_000 == pytest.approx(-np.diff(worse), abs=0.015)
 
@@ -579,12 +580,12 @@ def test_one_generation_is_traced_once():
         traces.append(1)
         return advance.__wrapped__(*given)
 
-    counted.__name__ = "advance"  # to the cache of programs it is that one
+    counted.__name__ = "advance"  # the name that the compilation cache knows
     run(toy(), 10, program=jax.jit(counted))
     assert len(traces) == 1
 
 
-def test_no_generation_draws_the_numbers_of_another():
+def test_generations_draw_different_random_numbers():
     given, states = inputs(toy()), [state for state, _ in run(toy(), 6)]
     keys = {tuple(np.asarray(jax.random.key_data(state.key)).tolist()) for state in states}
     assert len(keys) == 6

@@ -1,6 +1,4 @@
-"""The operators: offspring stay inside the box, and their genes come from where the operator
-says.
-"""
+"""Variation operators: offspring stay inside the box, and genes come from the stated source."""
 
 from functools import partial
 
@@ -37,7 +35,7 @@ def inside(genomes: Genome) -> bool:
 
 
 def inputs(config: EvolutionConfig) -> EvolutionConfig:
-    """Settings as inputs of a program, as in a run: all kinds of an operator share one."""
+    """Settings as program inputs, as in a run; all kinds of an operator share a program."""
     return traced(Config(evolution=config)).evolution
 
 
@@ -107,7 +105,7 @@ def test_every_pose_of_a_child_is_one_of_a_parent(crossing: str):
 
 @pytest.mark.parametrize("share", [0.25, 0.75])
 def test_mixed_crossover_permutes_the_stated_share_of_children(share: float):
-    """An aligned child has every pose in its place; of permuted ones with K = 3 one in 15 has."""
+    """An aligned child has all poses in place; with K = 3 so has 1 in 15 permuted children."""
     mother, father = (
         jax.tree.map(lambda leaf: leaf[0], variation.uniform(key, BOX, 1)) for key in keys(2)
     )
@@ -128,7 +126,7 @@ def test_mixed_mutation_redraws_the_stated_share_of_mutants(share: float):
 @pytest.mark.parametrize(
     ("mutation", "changed"), [("redraw", 2), ("single", 1), ("pose", J), ("gaussian", J)]
 )
-def test_mutation_changes_one_pose_and_as_many_joints_as_its_kind_says(mutation: str, changed: int):
+def test_mutation_changes_one_pose_and_the_joint_count_of_its_kind(mutation: str, changed: int):
     genome = Genome(jnp.zeros((K, J)), jnp.full(E, 0.5).at[0].set(0.0))
     mutants = mutated(EvolutionConfig(mutation=mutation, tuning_rate=0.0), genome)
     differs = np.asarray(mutants.key_poses != genome.key_poses)
@@ -138,7 +136,7 @@ def test_mutation_changes_one_pose_and_as_many_joints_as_its_kind_says(mutation:
     assert np.all(mutants.tuning == genome.tuning)
 
 
-def test_mixed_mutation_is_the_one_kind_or_the_other():
+def test_each_mixed_mutant_has_one_kind_of_mutation():
     genome = Genome(jnp.zeros((K, J)), jnp.zeros(E))
     mutants = mutated(EvolutionConfig(mutation="mixed", tuning_rate=0.0), genome)
     differs = np.asarray(mutants.key_poses != 0)
@@ -147,7 +145,7 @@ def test_mixed_mutation_is_the_one_kind_or_the_other():
     assert 70 < counts[2] < 130
 
 
-def test_the_initial_spread_is_the_middle_of_each_range():
+def test_the_initial_spread_covers_the_middle_of_each_range():
     genomes = created(EvolutionConfig(initial_spread=0.5), 500)
     reach = np.abs(genomes.key_poses).max(axis=0) / BOX.high.key_poses
     assert ((reach > 0.45) & (reach <= 0.5)).all()
@@ -159,17 +157,17 @@ def test_mutation_never_leaves_the_box():
 
 
 TWINS = Box({"a": jnp.zeros(50), "b": jnp.zeros(50)}, {"a": jnp.ones(50), "b": jnp.ones(50)})
-"""Two arrays of one shape and range."""
+"""Two arrays of equal shape and range."""
 
 
 @pytest.mark.parametrize("draw", [variation.uniform, variation.latin_hypercube])
-def test_arrays_of_one_shape_are_drawn_apart(draw):
+def test_arrays_of_equal_shape_are_drawn_independently(draw):
     drawn = draw(key_of(3), TWINS, 4)
     assert float(jnp.mean(drawn["a"] == drawn["b"])) < 0.1
 
 
-def test_arrays_of_one_shape_are_varied_apart():
-    """Crossover takes other genes in each, and mutation moves others."""
+def test_arrays_of_equal_shape_are_varied_independently():
+    """Crossover and mutation choose different genes in each."""
     operators = variation.real_variation(TWINS, EvolutionConfig())
     child = operators.cross(key_of(4), TWINS.low, TWINS.high)
     assert 0.2 < float(jnp.mean(child["a"] == child["b"])) < 0.8

@@ -1,7 +1,6 @@
-"""Several runs side by side: a run folder for each seed, and all champions in one picture.
+"""Multi-seed training: a run folder for each seed, and all champions in one picture.
 
-Who evolves them are made-up hands; that a row is the run that its seed alone is, the tests of rows
-say.
+Stand-in workers evolve the runs. The tests of rows compare a row with the run of its seed alone.
 """
 
 import dataclasses
@@ -34,7 +33,7 @@ SEEDS = (5, 6, 7)
 
 
 def begun(zoo: Path, creature: Creature, together: int = 0) -> Path:
-    """Of runs that would end early if they were alone."""
+    """Begin runs that would each end early if run alone."""
     config = small_config(evolution={"target": 1e-3, "generations": 4}, examination={"every": 2})
     config = dataclasses.replace(config, seed=5, checkpoint_every=1)
     return create_zoo(zoo, creature, config, len(SEEDS), together)
@@ -54,7 +53,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, stool: Creature) -> Path:
     return zoo
 
 
-def test_each_seed_is_a_run_that_goes_on_to_its_last_generation(finished: Path):
+def test_each_seed_runs_to_its_last_generation(finished: Path):
     folders = folders_of(finished)
     assert [folder.name for folder in folders] == [f"seed{seed}" for seed in SEEDS]
     for seed, folder in zip(SEEDS, folders, strict=True):
@@ -65,19 +64,19 @@ def test_each_seed_is_a_run_that_goes_on_to_its_last_generation(finished: Path):
         assert stored_generations(folder) == [1, 2, 3, 4]
 
 
-def test_each_seed_begins_with_a_population_of_its_own(finished: Path, stool: Creature):
+def test_each_seed_starts_with_its_own_population(finished: Path, stool: Creature):
     poses = [read_stored(folder, stool.digest).arrays[POSES] for folder in folders_of(finished)]
     assert not np.array_equal(poses[0], poses[1])
     assert not np.array_equal(poses[1], poses[2])
 
 
-def test_stopped_on_the_way_all_go_on_to_the_same_end(
+def test_interrupted_runs_resume_to_the_same_result(
     finished: Path, tmp_path: Path, stool: Creature
 ):
     zoo = begun(tmp_path / "again", stool)
     assert not go_on(zoo, stool, Interrupted)
     last = read_metrics(folders_of(zoo)[0] / METRICS)[-1]
-    with (folders_of(zoo)[0] / METRICS).open("a") as log:  # killed before its state was stored
+    with (folders_of(zoo)[0] / METRICS).open("a") as log:  # killed before the state was stored
         log.write(json.dumps(last | {"generation": last["generation"] + 1}) + "\n")
     assert go_on(zoo, stool)
     for one, again in zip(folders_of(finished), folders_of(zoo), strict=True):
@@ -86,10 +85,8 @@ def test_stopped_on_the_way_all_go_on_to_the_same_end(
         assert read_metrics(one / METRICS) == read_metrics(again / METRICS)
 
 
-def test_in_several_pieces_of_work_all_come_to_the_same(
-    finished: Path, tmp_path: Path, stool: Creature
-):
-    """Two runs and one; what made-up hands do to a run does not depend on who is beside it."""
+def test_several_jobs_give_the_same_result_as_one(finished: Path, tmp_path: Path, stool: Creature):
+    """Jobs of two runs and one; a stand-in worker treats each run independently."""
     zoo = begun(tmp_path / "pieces", stool, together=2)
     assert go_on(zoo, stool)
     for one, other in zip(folders_of(finished), folders_of(zoo), strict=True):
@@ -100,7 +97,7 @@ def test_in_several_pieces_of_work_all_come_to_the_same(
 
 @pytest.fixture(scope="module")
 def examined(finished: Path, stool: Creature) -> Path:
-    """As an examination would leave it that the first passed, and in which the last had nobody."""
+    """The first run passed its examination, the second failed, the third has no champion."""
     for folder, passed in zip(folders_of(finished)[:2], (True, False), strict=True):
         write_champion(treading(stool), stool, folder / CHAMPION)
         (folder / CERTIFICATE).write_text(certificate(stool, passed))
@@ -113,7 +110,9 @@ def test_all_champions_are_in_one_table(examined: Path):
     assert [one.verdict for one in found] == ["certified", "fails progress", "not examined"]
 
 
-def test_what_is_examined_is_shown_again(examined: Path, capsys: pytest.CaptureFixture):
+def test_resuming_examined_runs_shows_the_results_again(
+    examined: Path, capsys: pytest.CaptureFixture
+):
     (folders_of(examined)[2] / CERTIFICATE).write_text(
         (folders_of(examined)[1] / CERTIFICATE).read_text()
     )

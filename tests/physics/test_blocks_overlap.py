@@ -1,4 +1,4 @@
-"""How deep blocks are in each other, against MuJoCo's own collisions of boxes."""
+"""Overlap of blocks against MuJoCo's own collisions of boxes."""
 
 import jax
 import jax.numpy as jnp
@@ -17,7 +17,7 @@ from mjxgait.types import BodyState
 
 
 def ours(bodies: Body, bent: np.ndarray) -> np.ndarray:
-    """[LANES] of the smaller block's size, of angles [LANES, links]."""
+    """Overlap [LANES] relative to the smaller block, for angles [LANES, links]."""
     tree = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), bodies.tree)
     root = np.tile([[0.0], [0], [0], [1], [0], [0], [0]], LANES)
     still = jnp.zeros((CAPACITY.links + 5, LANES))
@@ -27,7 +27,7 @@ def ours(bodies: Body, bent: np.ndarray) -> np.ndarray:
 
 
 def theirs(body: Body, parts: list[Part], bent: np.ndarray) -> float:
-    """Of the smaller block's size; angles [links]."""
+    """Overlap relative to the smaller block, for angles [links]."""
     creature = load_files(body_files(parts, "blocks", 0.01, 0.0, None, "in water"))
     qpos = creature.stand_qpos.copy()
     for part in range(1, len(parts)):
@@ -44,7 +44,7 @@ def theirs(body: Body, parts: list[Part], bent: np.ndarray) -> float:
 
 @pytest.fixture(scope="module")
 def depths() -> tuple[np.ndarray, np.ndarray]:
-    """Ours and MuJoCo's, of random bodies in random poses that have a hinge and two parts."""
+    """Overlaps here and in MuJoCo, of random bodies with a hinge in random poses."""
     graphs = random_graphs(7)
     bodies = bodies_of(graphs)
     bent = np.random.default_rng(7).uniform(-1.6, 1.6, (LANES, CAPACITY.links))
@@ -58,16 +58,16 @@ def depths() -> tuple[np.ndarray, np.ndarray]:
     return found[known], expected[known]
 
 
-def test_no_depth_is_missed(depths: tuple[np.ndarray, np.ndarray]):
-    """MuJoCo tells the deepest corner along its normal, which may be more than the way out."""
+def test_no_overlap_is_missed(depths: tuple[np.ndarray, np.ndarray]):
+    """MuJoCo reports the deepest corner along its normal, which may exceed the way out."""
     found, expected = depths
     assert (expected > 0.01).mean() > 0.15
     assert (found[expected > 1e-4] > 0).all()
     assert (np.maximum(found, 0) >= 0.65 * expected - 1e-4).all()
 
 
-def test_most_depths_are_what_they_are(depths: tuple[np.ndarray, np.ndarray]):
-    """Where a line along two edges separates, ours is too large."""
+def test_most_overlaps_are_accurate(depths: tuple[np.ndarray, np.ndarray]):
+    """Where only an axis along two edges separates the boxes, the result here is too large."""
     found, expected = depths
     deep = expected > 0.01
     assert np.median(found[deep] / expected[deep]) < 1.2

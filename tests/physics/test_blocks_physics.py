@@ -1,4 +1,4 @@
-"""Random bodies of blocks, each lane another, against C MuJoCo on the model of each."""
+"""Random modular bodies, a different one in each lane, against C MuJoCo on the model of each."""
 
 import dataclasses
 from collections.abc import Callable
@@ -28,7 +28,7 @@ IN_WATER = Surroundings(floor=False, gravity=0.0, drag=300.0)
 
 @cache
 def stepping(around: Surroundings) -> Callable[..., Any]:
-    """From a state and torques to what is sensed, how near corners are, and the next state."""
+    """Function of state and torques: sensed values, corner distances to the ground, next state."""
     plant = TreePlant(around)
 
     def step(state: BodyState, torque: jax.Array) -> Any:
@@ -40,7 +40,7 @@ def stepping(around: Surroundings) -> Callable[..., Any]:
 
 
 def looked_at(state: BodyState) -> tuple[Any, np.ndarray]:
-    """What is sensed on land, and how near corners are to the ground."""
+    """Sensed values on land, and the distances of corners to the ground."""
     sensed, near, _ = stepping(ON_LAND)(state, jnp.zeros_like(state.qvel))
     return jax.tree.map(np.asarray, sensed), np.asarray(near)
 
@@ -56,7 +56,7 @@ def bodies(graphs: Graph) -> Body:
 
 
 def model_of(graph: Graph, around: Surroundings) -> mujoco.MjModel:
-    """In MuJoCo, of parts that were grown without JAX; here blocks go through each other."""
+    """MuJoCo model of parts grown without JAX; here blocks do not collide."""
     parts = grow(genome_of(graph), CAPACITY.parts, CAPACITY.links)
     friction = around.friction if around.floor else None
     model = mujoco.MjModel.from_xml_string(body_xml(parts, around.step, around.gravity, friction))
@@ -78,7 +78,7 @@ def links_of(body: Body, model: mujoco.MjModel) -> list[int]:
 
 
 def moments(bodies: Body, height: float, seed: int = 0) -> BodyState:
-    """A state per lane: any attitude, joints bent beyond their ranges, everything in motion."""
+    """One state per lane: any attitude, joints beyond their ranges, everything in motion."""
     rng, moves = np.random.default_rng(seed), np.asarray(bodies.tree.moves)[:, 1:].T
     quat = rng.normal(size=(4, LANES))
     bent = rng.uniform(-1.2, 1.2, moves.shape) * moves
@@ -98,7 +98,7 @@ def moments(bodies: Body, height: float, seed: int = 0) -> BodyState:
 def in_mujoco(
     graph: Graph, body: Body, state: BodyState, lane: int, around: Surroundings
 ) -> tuple[mujoco.MjModel, mujoco.MjData, list[int]]:
-    """The lane's body and state; and the links of its hinges."""
+    """The lane's body and state, and the links of its hinges."""
     model = model_of(graph, around)
     model.opt.tolerance, model.opt.iterations = 1e-12, 100
     data, links = mujoco.MjData(model), links_of(body, model)
@@ -108,7 +108,7 @@ def in_mujoco(
     return model, data, links
 
 
-def test_bodies_weigh_what_mujoco_says(graphs: Graph, bodies: Body):
+def test_masses_and_inverse_weights_match_mujoco(graphs: Graph, bodies: Body):
     for lane in range(LANES):
         body = one(bodies, lane)
         model = model_of(one(graphs, lane), ON_LAND)
@@ -130,7 +130,7 @@ AIR = pytest.param(
 
 
 @pytest.mark.parametrize("around", [ON_LAND, AIR], ids=["land", "air"])
-def test_a_step_is_that_of_c_mujoco(graphs: Graph, bodies: Body, around: Surroundings):
+def test_one_step_matches_c_mujoco(graphs: Graph, bodies: Body, around: Surroundings):
     state = moments(bodies, 0.3)
     moves = np.concatenate([np.zeros((6, LANES)), np.asarray(bodies.tree.moves)[:, 1:].T])
     torque = np.random.default_rng(2).normal(size=moves.shape) * moves * 5
@@ -150,7 +150,7 @@ def test_a_step_is_that_of_c_mujoco(graphs: Graph, bodies: Body, around: Surroun
     assert not still.any(), "what is not there does not move"
 
 
-def test_what_is_sensed_is_where_it_is_in_c_mujoco(graphs: Graph, bodies: Body):
+def test_sensed_values_match_c_mujoco(graphs: Graph, bodies: Body):
     state = moments(bodies, 0.3)
     sensed, _ = looked_at(state)
     for lane in range(LANES):
@@ -175,8 +175,8 @@ def test_what_is_sensed_is_where_it_is_in_c_mujoco(graphs: Graph, bodies: Body):
         np.testing.assert_allclose(sensed.trunk_angvel[:, lane], spin, atol=1e-5)
 
 
-def test_the_corners_that_touch_are_those_of_c_mujoco(graphs: Graph, bodies: Body):
-    """The four that are below a block's middle, however deep in the ground it is."""
+def test_touching_corners_match_c_mujoco(graphs: Graph, bodies: Body):
+    """The four corners below a block's centre, however deep in the ground."""
     state = moments(bodies, 0.0)
     distance = looked_at(state)[1].reshape(-1, CAPACITY.links, LANES)
     for lane in range(LANES):
@@ -190,9 +190,9 @@ def test_the_corners_that_touch_are_those_of_c_mujoco(graphs: Graph, bodies: Bod
             np.testing.assert_allclose(mine[mine < 0], touching, atol=1e-5)
 
 
-def test_bodies_rest_on_the_ground(graphs: Graph, bodies: Body):
-    """With straight joints as high as their files have them, and with bent ones too on the lowest
-    corner; in water they stay where they are.
+def test_bodies_start_on_the_ground(graphs: Graph, bodies: Body):
+    """With straight joints at the height of their files; with bent joints on the lowest corner.
+    In water they stay in place.
     """
     straight = np.zeros((LANES, 7 + CAPACITY.links - 1), np.float32)
     straight[:, 3] = 1.0
@@ -216,7 +216,7 @@ def test_bodies_rest_on_the_ground(graphs: Graph, bodies: Body):
     np.testing.assert_array_equal(wet.rested(same, bent[0]), bent[0])
 
 
-def test_who_is_deepest_in_the_ground_is_told_in_its_size(bodies: Body):
+def test_sinking_depth_is_relative_to_block_size(bodies: Body):
     state = moments(bodies, 0.0)
     sensed, _ = looked_at(state)
     for lane in range(LANES):
@@ -227,7 +227,7 @@ def test_who_is_deepest_in_the_ground_is_told_in_its_size(bodies: Body):
         assert sensed.body.depth[lane] == pytest.approx(deepest, rel=1e-4, abs=1e-6)
 
 
-def test_the_light_is_seen_in_each_blocks_own_axes(graphs: Graph, bodies: Body):
+def test_light_direction_is_in_each_blocks_own_axes(graphs: Graph, bodies: Body):
     state, place = moments(bodies, 0.3), np.array([3.0, -4.0, 1.0])
     sensed, _ = looked_at(state)
     nobody: Any = None

@@ -1,4 +1,4 @@
-"""Episodes whose lanes refill with other bodies, against those of one body at a time."""
+"""Episodes whose lanes refill with different bodies, against episodes with one body."""
 
 import dataclasses
 from typing import Any
@@ -25,7 +25,7 @@ BODIES = (1.0, 0.6, 1.7)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BodyPerStart(Simulator):
-    """numbers: leaves [R, ...], of the bodies that the starts belong to."""
+    """A simulator with one body per start. numbers: body parameters, leaves [R, ...]."""
 
     numbers: Any = None
 
@@ -47,7 +47,7 @@ pytestmark = pytest.mark.thorough(
 def statistics(
     request: pytest.FixtureRequest, stool: Creature
 ) -> tuple[EpisodeStats, list[EpisodeStats]]:
-    """Of three starts with three bodies, together; and of all starts with each body."""
+    """Statistics of three starts with three bodies together, and of all starts with each body."""
     settings = {"physics": request.param, "lanes": 2, "starts": len(BODIES), "terminate": False}
     experiment = build_experiment(stool, small_config(rollout=settings))
     simulator, plant = experiment.simulator, experiment.simulator.plant
@@ -79,18 +79,18 @@ def statistics(
 
     same = [stacked([each] * len(BODIES)) for each in numbers]
     together, *alone = run(mixed, stacked(numbers), *same)
-    # Another program of the fast step would take long to compile.
+    # Another program of lane-major physics would take long to compile.
     return together, run(one, *numbers) if request.param == "mjx" else alone
 
 
-def test_every_episode_has_its_own_body(statistics: tuple[EpisodeStats, list[EpisodeStats]]):
+def test_every_episode_keeps_its_own_body(statistics: tuple[EpisodeStats, list[EpisodeStats]]):
     together, alone = statistics
     for start, theirs in enumerate(alone):
         ours = together.forward[0, :, start]
         np.testing.assert_allclose(ours, theirs.forward[0, :, start], atol=1e-4)
 
 
-def test_the_bodies_walk_differently(statistics: tuple[EpisodeStats, list[EpisodeStats]]):
+def test_different_bodies_walk_differently(statistics: tuple[EpisodeStats, list[EpisodeStats]]):
     _, (own, light, heavy) = statistics
     for other in (light, heavy):
         assert np.abs(own.forward - other.forward).max() > 1e-3

@@ -1,4 +1,4 @@
-"""Lanes with bodies of their own for many steps: a shipped quadruped's variants."""
+"""Lanes with different bodies over many steps: variants of a shipped quadruped."""
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +16,7 @@ from mjxgait.types import BodyState, Plant
 
 
 def after(plant: Plant, state: BodyState, torque: jax.Array, steps: int) -> np.ndarray:
-    """qpos [L, nq] after so many steps under a torque [nv, L] that stays."""
+    """qpos [L, nq] after `steps` steps under a constant torque [nv, L]."""
 
     def step(_: int, state: BodyState) -> BodyState:
         return plant.advance(state, plant.forward(state)[1], torque)
@@ -29,7 +29,7 @@ def after(plant: Plant, state: BodyState, torque: jax.Array, steps: int) -> np.n
 
 @pytest.fixture(scope="module")
 def quadrupeds() -> list[mujoco.MjModel]:
-    """The tall quadruped with its parts' masses, armatures and lengths changed."""
+    """The tall quadruped with changed masses, armatures and lengths."""
     model = load_creature(find_creature("tall_quadruped")).evolution_model
     rng, variants = np.random.default_rng(0), []
     for _ in range(4):
@@ -44,7 +44,7 @@ def quadrupeds() -> list[mujoco.MjModel]:
 
 
 @pytest.mark.thorough("test_bodies.py has eighty steps of another body")
-def test_a_shipped_quadruped_whose_body_is_varied(quadrupeds: list[mujoco.MjModel]):
+def test_variants_of_a_shipped_quadruped_match_c_mujoco(quadrupeds: list[mujoco.MjModel]):
     creature = load_creature(find_creature("tall_quadruped"))
     layout = observation_layout(creature)
     plant = fast_plant(creature.evolution_model, layout)

@@ -1,8 +1,8 @@
-"""The same episodes through the fast step, plain MJX and the examiner: every figure must agree.
+"""The same episodes in lane-major physics, plain MJX and the reference simulator: all must agree.
 
-The examiner is C MuJoCo in float64 under a controller of its own; what its recording means for the
-statistics are worked out once more, in plain NumPy (`recorded_stats`). Nothing that changes the motion,
-or what is counted of it, on one of the three ways can stay unseen.
+The reference simulator is C MuJoCo in float64 with its own controller. The statistics of its
+recordings are computed again in plain NumPy (`recorded_stats`). A change to the motion or to a
+statistic in one of the three cannot pass unnoticed.
 """
 
 import jax
@@ -42,7 +42,7 @@ from mjxgait.tasks.walk.stats import EpisodeStats
 from mjxgait.training.experiment import build_experiment
 
 SLIM = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": True}
-"""Compiling is what takes the time here. The older way of emitting rounds otherwise, and one of the episodes ends elsewhere."""
+"""Most of the time is compilation. The older emitter rounds differently and changes an episode."""
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def outcomes(body: Creature) -> list[Outcome]:
 
 
 def starts_of(creature: Creature, films: list[Outcome]) -> Starts:
-    """The same starts for evolution, [B, R]; the examiner lifts bodies with displaced joints."""
+    """The same starts for evolution, [B, R]; certification lifts bodies with displaced joints."""
     rows, wanted = disturbed(creature), []
     push = np.zeros((len(rows), creature.model.nv))
     push[:, :2] = rows.push
@@ -88,7 +88,7 @@ MJX = pytest.mark.thorough("test_ground_parity.py compares the fast step with MJ
 def statistics(
     request: pytest.FixtureRequest, body: Creature, outcomes: list[Outcome]
 ) -> EpisodeStats:
-    """Evolution's, leaves [B, 1, R, ...]."""
+    """Statistics of evolution, leaves [B, 1, R, ...]."""
     rollout = {"seconds": SECONDS, "lanes": 3, "physics": request.param, **LENIENT}
     simulator = build_experiment(body, small_config(rollout=rollout)).simulator
     genes = STILL | GENES_OF_THE_GAIT
@@ -104,7 +104,7 @@ def statistics(
 def expected(
     body: Creature, outcomes: list[Outcome]
 ) -> dict[tuple[str, str], dict[str, np.ndarray]]:
-    """What the examiner's recordings mean for the statistics, by settings and disturbance."""
+    """Statistics from the reference simulator's recordings, by settings and disturbance."""
     found = {}
     for name, config, outcome in zip(SETTINGS, CONFIGS, outcomes, strict=True):
         clearance = config.fitness.clearance * body.frame.hip_height
@@ -118,7 +118,7 @@ def expected(
     return found
 
 
-def test_every_field_of_the_statistics_is_compared(expected: dict):
+def test_every_statistic_is_compared(expected: dict):
     for name in FIELDS:
         assert all(name in stats for stats in expected.values()), (
             f"EpisodeStats.{name} is compared with nothing: work it out in recorded_stats.py, or say in "
@@ -127,7 +127,7 @@ def test_every_field_of_the_statistics_is_compared(expected: dict):
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_the_statistics_is_what_the_examiner_saw(
+def test_statistics_match_the_reference_simulator(
     statistics: EpisodeStats, expected: dict, name: str
 ):
     rows = dict(
@@ -140,34 +140,34 @@ def test_the_statistics_is_what_the_examiner_saw(
 
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "reason"])
-def test_every_field_has_something_to_show(expected: dict, name: str):
-    """A figure that is next to zero in all episodes would agree with anything."""
+def test_every_statistic_is_nonzero_somewhere(expected: dict, name: str):
+    """A value near zero in all episodes would agree with anything."""
     values = [np.asarray(stats[name], float) for stats in expected.values()]
     assert any(np.abs(value).max() > 3 * tolerance(name, value) for value in values)
 
 
 def apart(one: dict, other: dict) -> float:
-    """How many tolerances two episodes differ by in where they lead."""
+    """Distance between the final poses of two episodes, in tolerances."""
     places = ("forward", "left", "heading")
     return max(abs(one[name] - other[name]) / tolerance(name, one[name]) for name in places)
 
 
 @pytest.mark.parametrize("disturbance", list(DISTURBANCES)[1:])
-def test_every_disturbance_shows(expected: dict, disturbance: str):
+def test_every_disturbance_changes_the_motion(expected: dict, disturbance: str):
     one, other = (expected["stable PD", name] for name in (disturbance, "nominal"))
     assert apart(one, other) > 5
 
 
 @pytest.mark.parametrize("settings", list(SETTINGS)[1:])
-def test_all_settings_show(expected: dict, settings: str):
+def test_every_setting_changes_the_motion(expected: dict, settings: str):
     one, other = (expected[name, "pushed to the left"] for name in (settings, "stable PD"))
     assert apart(one, other) > 5
 
 
-def test_a_fall_ends_the_episode_where_the_examiner_sees_it(
+def test_a_fall_ends_the_episode_at_the_reference_simulators_time(
     outcomes: list[Outcome], statistics: EpisodeStats
 ):
-    """Why it ended has been compared above; the examiner dates a fall by the end of its step."""
+    """Reasons are compared above; the reference simulator dates a fall by the end of its step."""
     knocked = list(DISTURBANCES).index("knocked over")
     for row, name in enumerate(SETTINGS):
         fell = round(outcomes[row].fell[knocked] / STEP)

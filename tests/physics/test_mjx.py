@@ -1,4 +1,4 @@
-"""MJX as a choice: `--physics mjx` trains with it, by every command that simulates."""
+"""`--physics mjx` trains with MJX, in every command that simulates."""
 
 import json
 from pathlib import Path
@@ -39,7 +39,7 @@ SMALL = [
 
 @pytest.fixture
 def own_step_is_absent(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run that asks for this program's own step fails."""
+    """Make any use of lane-major physics fail."""
 
     def absent(*_: object, **__: object) -> None:
         raise AssertionError("this program's own step, not MJX")
@@ -50,7 +50,7 @@ def own_step_is_absent(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_run_with_mjx_ends_with_a_certificate(
     own_step_is_absent: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """With 3 s of examination instead of 22, and of a population that cannot walk yet."""
+    """With 3 s of certification instead of 22 s, and a population that cannot walk yet."""
     monkeypatch.setattr("mjxgait.certification.certificate.CertificateConfig", short_examination)
     run = tmp_path / "run"
     assert train_command(["--env", str(STOOL), *SMALL, "--physics", "mjx", "--out", str(run)]) == 0
@@ -63,8 +63,8 @@ def test_a_run_with_mjx_ends_with_a_certificate(
     assert np.isfinite(champion["fitness"])
 
 
-def test_every_command_that_simulates_takes_mjx(stool: Creature, tmp_path: Path):
-    """Into the settings of its runs: those of a repertoire, and of a study whatever its variants say."""
+def test_every_command_that_simulates_accepts_mjx(stool: Creature, tmp_path: Path):
+    """Runs of a repertoire use it, and runs of a study whatever its variants set."""
     options = RepertoireOptions(
         str(STOOL), speeds=("0.1",), turns=(), out=tmp_path / "set", physics="mjx"
     )
@@ -80,7 +80,7 @@ def test_every_command_that_simulates_takes_mjx(stool: Creature, tmp_path: Path)
     assert {run.config.rollout.physics for run in plan.runs} == {"auto"}
 
 
-def test_a_refined_cycle_takes_mjx(
+def test_refining_a_cycle_accepts_mjx(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stool: Creature
 ):
     file = write(tmp_path, "csv", stool, swings(stool))
@@ -97,8 +97,8 @@ def test_a_refined_cycle_takes_mjx(
     assert open_run(run)[1].rollout.physics == "mjx"
 
 
-def test_bodies_that_grow_refuse_mjx(tmp_path: Path, capsys: pytest.CaptureFixture):
-    """They have no model that MJX could read."""
+def test_growing_bodies_reject_mjx(tmp_path: Path, capsys: pytest.CaptureFixture):
+    """They have no model for MJX to read."""
     run = tmp_path / "run"
     said = said_by(capsys, "train", "--env", "blocks", "--physics", "mjx", "--out", run, code=2)
     assert "rollout.physics" in said

@@ -1,4 +1,4 @@
-"""docs/guide/your-own-task.md does what it says."""
+"""The examples of docs/guide/your-own-task.md work."""
 
 import csv
 import io
@@ -26,7 +26,7 @@ SMALL = (
 
 
 def blocks(language: str) -> list[str]:
-    """The page's code in a language."""
+    """Code blocks of the page in a language."""
     return re.findall(rf"```{language}\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
 
@@ -38,7 +38,7 @@ def call(command: str) -> int:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
-    """Where the page's code lies as `my.py`."""
+    """Folder with the page's code as `my.py`."""
     folder = tmp_path_factory.mktemp("own")
     (folder / "my.py").write_text("\n\n".join(blocks("python")))
     (folder / "short.toml").write_text(SHORT)
@@ -47,7 +47,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def trained(folder: Path) -> Path:
-    """The run that the page's commands make, on a small body and in little time."""
+    """Run of the page's commands, on a small body and for a short time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         train, certify, inspect = "".join(blocks("sh")).strip().splitlines()
@@ -59,13 +59,13 @@ def trained(folder: Path) -> Path:
 
 
 def test_the_examples_are_short():
-    """Twenty lines are enough for either; imports and blank lines apart."""
+    """At most 24 lines each, without imports and blank lines."""
     for code in blocks("python"):
         _, _, classes = code.partition("\n\n\n")
         assert len([line for line in classes.splitlines() if line.strip()]) <= 24
 
 
-def test_the_champion_is_the_users_own(trained: Path):
+def test_the_champion_names_the_users_own_code(trained: Path):
     champion = json.loads((trained / "champion.json").read_text())
     assert (champion["controller"], champion["task"]) == ("my.py:Spin", "my.py:Stand")
     assert {name: len(values) for name, values in champion["genome"].items()} == {
@@ -76,7 +76,7 @@ def test_the_champion_is_the_users_own(trained: Path):
     assert set(champion["terms"]) == {"alive", "moved"}
 
 
-def test_it_is_examined_by_its_own_criteria(trained: Path):
+def test_the_examination_uses_the_tasks_own_criteria(trained: Path):
     document = json.loads((trained / "certificate.json").read_text())
     assert [c["number"] for c in document["criteria"]] == [1, 4, 5, 6, 8, 9, 10]
     stays = document["criteria"][-1]["measures"][0]
@@ -84,8 +84,8 @@ def test_it_is_examined_by_its_own_criteria(trained: Path):
     assert stays["value"] > 0
 
 
-def test_evolution_and_examiner_agree_on_it(trained: Path):
-    """How long it stands: undisturbed, in evolution and in C MuJoCo."""
+def test_evolution_and_reference_simulator_agree(trained: Path):
+    """They agree on how long the body stands undisturbed."""
     champion = json.loads((trained / "champion.json").read_text())
     assert champion["origin"]["nominal"]["seconds"] == pytest.approx(0.4)
 
@@ -113,8 +113,8 @@ settings = {{ evolution = {{ mutation_rate = 0.2 }} }}
 
 
 @pytest.mark.thorough("another test trains it; tests/experiments/ablation runs a study")
-def test_it_takes_part_in_studies(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """The processes that measure champions, here on two grounds, load it as well."""
+def test_own_code_takes_part_in_studies(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """The processes that measure champions, here on two grounds, load the code too."""
     monkeypatch.chdir(folder)
     (folder / "study.toml").write_text(STUDY)
     assert call("ablate study.toml --controller my.py:Spin --out study") == 0
@@ -140,8 +140,8 @@ def test_no_code_is_loaded_from_a_run(trained: Path, capfd, monkeypatch):
     assert call(whole.partition("mjxgait ")[2]) == 0
 
 
-def test_what_comes_next_is_said_with_the_users_own_code(trained: Path, monkeypatch):
-    """The place of the file is right wherever the user is."""
+def test_the_next_steps_name_the_users_own_code(trained: Path, monkeypatch):
+    """The path of the file is right in any current folder."""
     out = io.StringIO()
     screen = Screen(Console(file=out, width=300))
     monkeypatch.chdir(trained.parents[1])
@@ -155,8 +155,8 @@ def test_what_comes_next_is_said_with_the_users_own_code(trained: Path, monkeypa
     assert own_options(trained)[1::2] == [f"{file}:Spin", f"{file}:Stand"]
 
 
-def test_a_run_that_does_not_say_where_its_code_lies_gives_its_name(trained: Path, tmp_path: Path):
-    """As those of earlier versions; what is no plain text is not printed."""
+def test_a_run_without_the_path_of_its_code_gives_the_name(trained: Path, tmp_path: Path):
+    """Runs of earlier versions lack the path. Only plain text is printed."""
     for name in ("config.toml", "own.toml"):
         shutil.copy(trained / name, tmp_path)
     (tmp_path / "own.toml").write_text('controller = "\\u001b[2J"\ntask = 3\n')
@@ -166,8 +166,8 @@ def test_a_run_that_does_not_say_where_its_code_lies_gives_its_name(trained: Pat
     assert own_options(tmp_path) == named
 
 
-def test_the_page_that_follows_a_run_is_given_the_same_code(folder: Path, trained, monkeypatch):
-    """What was named on the command line, whatever the run folder says."""
+def test_the_dashboard_of_a_run_gets_the_same_code(folder: Path, trained, monkeypatch):
+    """The command line decides, not the run folder."""
     started: list[list[str]] = []
 
     def start(words: list[str], **_: object) -> SimpleNamespace:

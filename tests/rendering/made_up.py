@@ -1,4 +1,4 @@
-"""Champions that nobody evolved: they tread on the spot, which is enough to look at."""
+"""Champions made without evolution, which tread on the spot or fall."""
 
 import dataclasses
 import json
@@ -13,7 +13,7 @@ from mjxgait.training.folder import CHAMPION, METRICS, create_run
 
 
 def treading(creature, degrees=4.0, period=0.5):
-    """Key poses a few degrees around the standing one, by the clock."""
+    """Key poses a few degrees around the stand, advanced by the clock."""
     rng = np.random.default_rng(3)
     poses = creature.joints.stand + np.radians(
         rng.uniform(-degrees, degrees, (2, len(creature.joints.names)))

@@ -1,4 +1,4 @@
-"""What is shown or exported without a certificate says so, and why."""
+"""Pictures and exports without a certificate say so, and why."""
 
 import dataclasses
 import json
@@ -23,12 +23,12 @@ def certificate(walk, *failed: tuple[int, str], **others: object) -> str:
     return json.dumps(made_up_certificate(walk.champion.fingerprint, *failed) | others)
 
 
-def test_a_certified_champion_is_not_doubted(run: Path, stool_walk):
+def test_a_certified_champion_gets_no_warning(run: Path, stool_walk):
     (run / CERTIFICATE).write_text(certificate(stool_walk))
     assert doubt(run, stool_walk) == ""
 
 
-def test_one_that_fails_is_told_by_what(run: Path, stool_walk):
+def test_failed_criteria_are_named(run: Path, stool_walk):
     (run / CERTIFICATE).write_text(certificate(stool_walk, (7, "slip")))
     assert doubt(run, stool_walk) == "Not certified: it fails criterion 7 slip"
     (run / CERTIFICATE).write_text(certificate(stool_walk, (1, "stays up"), (7, "slip")))
@@ -38,7 +38,7 @@ def test_one_that_fails_is_told_by_what(run: Path, stool_walk):
     )
 
 
-def test_a_certificate_that_does_not_count_is_told(run: Path, stool_walk):
+def test_a_missing_or_invalid_certificate_is_reported(run: Path, stool_walk):
     said = doubt(run, stool_walk)
     assert said == (f"Not certified: it has not been examined, which mjxgait certify {run} does")
     (run / CERTIFICATE).write_text(certificate(stool_walk, champion="another"))
@@ -56,7 +56,7 @@ def test_a_certificate_that_does_not_count_is_told(run: Path, stool_walk):
     ],
     ids=["export", "share", "render"],
 )
-def test_every_command_that_hands_a_walk_out_says_so_once(
+def test_export_share_and_render_warn_once(
     run: Path, arguments: tuple[str, ...], tmp_path: Path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
@@ -65,7 +65,7 @@ def test_every_command_that_hands_a_walk_out_says_so_once(
     assert said.count("Not certified: it has not been examined") == 1
 
 
-def test_of_a_race_each_is_named(run: Path, stool, tmp_path: Path, capsys):
+def test_a_race_names_each_uncertified_run(run: Path, stool, tmp_path: Path, capsys):
     other = shutil.copytree(run, tmp_path / "other")
     write_champion(falling(stool), stool, other / CHAMPION)
     size = ("--out", tmp_path / "race.png", "--seconds", "1", "--size", "64", "64")

@@ -1,4 +1,4 @@
-"""MuJoCo's own renderer is used where it works, and nothing breaks where it does not."""
+"""MuJoCo's own renderer is used where it works; elsewhere nothing breaks."""
 
 import os
 import subprocess
@@ -35,7 +35,7 @@ def test_both_renderers_draw_the_creature_at_the_same_place(stage, backend):
         np.abs(np.asarray(p.convert("L"), int) - f) > 45
         for p, f in zip((gl, painter), floor, strict=True)
     ]
-    # Shadows fall differently; the creatures' own outline does not.
+    # Shadows differ; the creatures' outlines do not.
     assert (masks[0] & masks[1]).sum() > 0.6 * min(masks[0].sum(), masks[1].sum())
 
 
@@ -45,7 +45,7 @@ def test_frames_move(stage, backend):
 
 
 @pytest.mark.parametrize("wanted", ["nonsense", "off"])
-def test_without_gl_it_says_so_in_one_line(stage, wanted):
+def test_missing_gl_is_reported_in_one_line(stage, wanted):
     backend, sentence = working_backend(stage, wanted)
     assert backend is None
     assert sentence.startswith("drawn without GL")
@@ -53,7 +53,7 @@ def test_without_gl_it_says_so_in_one_line(stage, wanted):
 
 
 def test_a_broken_gl_does_not_break_the_command(stool_run, tmp_path):
-    """MUJOCO_GL names a library that is not there: importing MuJoCo would fail."""
+    """MUJOCO_GL names a missing library: importing MuJoCo would fail."""
     done = subprocess.run(
         [
             *(

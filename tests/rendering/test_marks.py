@@ -1,4 +1,4 @@
-"""What is on the way is seen: the goal on the floor, and the bar; and it changes nothing else."""
+"""Overlays: the goal on the floor and the bar are drawn, and change nothing else."""
 
 import dataclasses
 
@@ -19,7 +19,7 @@ def limbo(stool: Creature) -> Walk:
 
 
 def marks(walk: Walk) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Place and size of what is shown besides the creature, by kind."""
+    """Place and size of each overlay, by kind."""
     model, data = walk.shown, mujoco.MjData(walk.shown)
     mujoco.mj_kinematics(model, data)
     extra = range(walk.creature.model.ngeom, model.ngeom)
@@ -30,7 +30,7 @@ def marks(walk: Walk) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     }
 
 
-def test_a_walk_has_nothing_on_its_way(stool_walk: Walk):
+def test_a_walk_has_no_overlays(stool_walk: Walk):
     assert stool_walk.marked is None
     assert stool_walk.shown is stool_walk.creature.model
 
@@ -42,15 +42,15 @@ def test_the_goal_of_hopping_is_a_disc_on_the_floor(stool: Creature):
     assert (ahead, place[2]) == (pytest.approx(1.2), size[1])
 
 
-def test_the_bar_is_where_the_examiner_has_it(limbo: Walk):
+def test_the_bar_is_where_the_reference_simulator_has_it(limbo: Walk):
     place, size = marks(limbo)["mjGEOM_CAPSULE"]
     ahead = (place[:2] - limbo.creature.frame.stand_pos[:2]) @ limbo.forward
     assert (ahead, place[2] - size[0]) == (pytest.approx(0.6), pytest.approx(0.35))
     assert {"mjGEOM_CYLINDER", "mjGEOM_CAPSULE"} == set(marks(limbo))
 
 
-def test_the_creature_is_drawn_as_it_is_and_where_it_is(limbo: Walk, stool_walk: Walk):
-    """Scale and view follow from the creature, and its parts are the first of all that is shown."""
+def test_overlays_do_not_change_the_drawing_of_the_creature(limbo: Walk, stool_walk: Walk):
+    """Scale and view depend on the creature alone, and its geoms come first."""
     with_bar, without = Stage([limbo], 320, 180), Stage([stool_walk], 320, 180)
     assert with_bar.scale == without.scale
     (barred,), (plain,) = with_bar.entrants, without.entrants
@@ -62,7 +62,7 @@ def test_the_creature_is_drawn_as_it_is_and_where_it_is(limbo: Walk, stool_walk:
         np.testing.assert_allclose(mine[:, : plain.shape[1]], plain, atol=1e-9)
 
 
-def test_the_other_renderer_is_told_too(limbo: Walk, tmp_path):
+def test_the_gl_renderer_gets_the_overlays(limbo: Walk, tmp_path):
     scene_file(Stage([limbo], 320, 180), [0], tmp_path / "scene.npz")
     with np.load(tmp_path / "scene.npz") as scene:
         model = mujoco.MjModel.from_xml_string(str(scene["xml"]))

@@ -1,6 +1,4 @@
-"""The painter that needs no GPU and no GL: shapes where MuJoCo has them, lengths that can be
-measured.
-"""
+"""The renderer without GPU and GL: shapes where MuJoCo has them, lengths to scale."""
 
 import mujoco
 import numpy as np
@@ -42,7 +40,7 @@ def view(scale=200.0):
 
 
 def painted(model):
-    """[240, 320] where the shape's red is."""
+    """Mask [240, 320] of the red shape, and its data."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     picture = paint(
@@ -122,7 +120,7 @@ def test_the_creature_walks_to_the_right_and_up_is_up():
     assert above[1] < here[1]
 
 
-def test_only_what_mujoco_shows_is_shown():
+def test_only_geoms_that_mujoco_shows_are_drawn():
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><asset><material name="m" rgba="0 1 0 1"/></asset><worldbody><geom type="plane" size="1 1 1"/><body>'
         '<geom size="1" material="m"/><geom size="1" group="4"/><geom size="1" rgba="0 0 0 0"/></body></worldbody></mujoco>'

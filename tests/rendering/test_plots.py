@@ -21,7 +21,7 @@ GAIT = {"footfalls", "joints", "trunk", "filmstrip"}
 
 
 def is_drawn(file):
-    """Whether a picture has something on it: dark marks, also when seen in grey."""
+    """Whether a picture has dark marks, also in grey."""
     if file.suffix == ".svg":
         return (
             len(list(ElementTree.parse(file).iter("{http://www.w3.org/2000/svg}path"))) > 5
@@ -45,7 +45,7 @@ def test_a_run_without_a_champion_has_its_curves(stool, tmp_path):
 
 
 @pytest.mark.parametrize("evaluation", [True, False])
-def test_a_curve_tells_of_a_middle_half_only_where_the_log_does(evaluation):
+def test_a_curve_shows_the_middle_half_only_if_the_log_has_it(evaluation):
     lines = [metrics_line(generation) for generation in range(3)]
     if not evaluation:
         lines = [line | {"lower_quartile": None, "upper_quartile": None} for line in lines]
@@ -65,7 +65,7 @@ def test_a_champion_that_falls_can_be_plotted(stool, tmp_path):
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full, a full disk")
 @pytest.mark.parametrize("kind", ["png", "svg"])
-def test_a_disk_that_fills_between_two_plots_is_one_sentence(stool, tmp_path, kind):
+def test_a_disk_full_between_two_plots_gives_one_sentence(stool, tmp_path, kind):
     run = write_run(tmp_path / "run", stool)
     (tmp_path / "plots").mkdir()
     (tmp_path / "plots" / f"terms.{kind}").symlink_to("/dev/full")
@@ -80,7 +80,7 @@ def test_one_generation_can_be_plotted(stool, tmp_path):
     )
 
 
-def test_nothing_to_plot_is_said(stool, tmp_path):
+def test_nothing_to_plot_is_reported(stool, tmp_path):
     run = write_run(tmp_path / "run", stool)
     (run / METRICS).unlink()
     with pytest.raises(UserError, match="nothing to plot"):
@@ -93,12 +93,12 @@ def test_missing_numbers_are_gaps():
     assert np.isnan(columns([metrics_line(0) | {"best": None}, metrics_line(1)])["best"][0])
 
 
-def test_the_curve_that_every_run_gets(tmp_path):
+def test_every_run_gets_a_fitness_curve(tmp_path):
     plot_fitness([metrics_line(g) for g in range(5)], tmp_path / "fitness.png")
     assert is_drawn(tmp_path / "fitness.png")
 
 
-def test_what_is_shown_is_named(stool, stool_walk):
+def test_the_gait_window_is_named(stool, stool_walk):
     window, what = gait_window(stool_walk)
     assert what.startswith("2 strides from")
     assert (window.stop - window.start) * stool_walk.time_step == pytest.approx(1.0, abs=0.02)

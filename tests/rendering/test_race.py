@@ -1,4 +1,4 @@
-"""A race: several walks on one floor, each in its lane, whatever the creatures and their clocks."""
+"""A race: several walks on one floor, each in its lane, for any creatures and clocks."""
 
 import dataclasses
 
@@ -22,7 +22,7 @@ def crab_walk():
 
 
 def moved(walk, ahead: float, left: float):
-    """The walk, at its end so far from where it would have ended."""
+    """The walk with its end shifted by this many m."""
     qpos, aside = walk.trajectory.qpos.copy(), np.array([-walk.forward[1], walk.forward[0]])
     share = np.linspace(0, 1, qpos.shape[1])[:, None]
     qpos[0, :, :2] += share * (ahead * walk.forward + left * aside)
@@ -30,8 +30,8 @@ def moved(walk, ahead: float, left: float):
 
 
 @pytest.mark.parametrize("way", [(1.0, 0.0), (0.0, 1.0), (-0.6, 0.8)])
-def test_everybody_goes_the_same_way(stool_walk, way):
-    """Whatever way of its world a creature walks, on the stage it is the stage's."""
+def test_all_participants_go_the_same_way(stool_walk, way):
+    """The scene's direction replaces a creature's own direction of walking."""
     forward, start = np.array(way), np.array([3.0, -2.0])
     walk = moved(stool_walk, 2.0, 0.5)
     participant = Participant(walk, start, forward)
@@ -47,7 +47,7 @@ def test_everybody_goes_the_same_way(stool_walk, way):
 
 
 def test_clocks_of_different_creatures_agree(stool_walk):
-    """One whose control steps are twice as long is shown at the same moment."""
+    """A walk with control steps twice as long is shown at the same moment."""
     slow = dataclasses.replace(
         stool_walk,
         trajectory=dataclasses.replace(stool_walk.trajectory, time_step=2 * stool_walk.time_step),
@@ -65,7 +65,7 @@ def test_lanes_are_as_wide_as_their_creatures(stool_walk, crab_walk):
     halves = [(one.across + other.across) / 2 for one, other in zip(*pairs(stage), strict=True)]
     assert (gaps > halves).all()
     assert gaps[0] == pytest.approx(gaps[1])
-    # Nobody is outside of the picture.
+    # No creature is outside the picture.
     for place, participant in enumerate(stage.entrants):
         pixels = stage.camera(0).pixels(participant.outline + stage.lanes[place])
         assert (pixels > 0).all()
@@ -76,8 +76,8 @@ def pairs(stage: Stage):
     return stage.entrants[:-1], stage.entrants[1:]
 
 
-def test_each_is_painted_in_its_own_colours(stool_walk, crab_walk):
-    """Both are in the picture: without either of them it is another one."""
+def test_every_participant_is_painted(stool_walk, crab_walk):
+    """The picture changes if either is removed."""
     both = Stage([stool_walk, crab_walk], 160, 96)
     whole = np.asarray(both.picture(10), int)
     for keep in (0, 1):
@@ -86,7 +86,7 @@ def test_each_is_painted_in_its_own_colours(stool_walk, crab_walk):
         assert np.abs(np.asarray(one.picture(10), int) - whole).max() > 50
 
 
-def test_several_kinds_are_painted_without_gl(stool_walk, crab_walk):
+def test_different_creatures_are_painted_without_gl(stool_walk, crab_walk):
     assert Stage([stool_walk, stool_walk], 64, 64).alike
     mixed = Stage([stool_walk, crab_walk], 64, 64)
     assert not mixed.alike
@@ -97,7 +97,7 @@ def test_several_kinds_are_painted_without_gl(stool_walk, crab_walk):
 
 
 def test_labels_stay_in_the_picture(stool_walk):
-    """Of one that is left far behind, too."""
+    """Even if the participant is far behind."""
     runners = [Runner(moved(stool_walk, ahead, 0.0), "x") for ahead in (9.0, 0.0)]
     stage = Stage([runner.walk for runner in runners], 320, 180)
     *_, last = moving_pictures(runners, stage, 2)
@@ -108,7 +108,7 @@ def test_labels_stay_in_the_picture(stool_walk):
     assert written[:, 8:40].any()
 
 
-def test_runs_race_under_names_that_tell_them_apart(stool_run, stool, tmp_path):
+def test_labels_of_a_race_are_distinct(stool_run, stool, tmp_path):
     crab = load_creature(find_creature("crab"))
     other = write_run(tmp_path / "crab_run", crab, treading(crab))
     again = write_run(tmp_path / "again", stool, treading(stool))
@@ -142,7 +142,7 @@ def test_a_race_of_runs_is_one_command(stool_run, tmp_path, capsys):
         (["a", "b"], "a"),
     ],
 )
-def test_what_cannot_race_is_said(tmp_path, monkeypatch, capsys, arguments, words):
+def test_an_impossible_race_is_reported(tmp_path, monkeypatch, capsys, arguments, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
         main(["render", *arguments, "--out", "race.webp"])

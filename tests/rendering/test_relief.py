@@ -1,4 +1,4 @@
-"""Ground that is no plane in pictures and files: drawn where it is, and the camera goes with it."""
+"""Uneven ground in pictures and files: drawn in place, and followed by the camera."""
 
 import dataclasses
 
@@ -27,7 +27,7 @@ def climb(stool_walk):
     )
 
 
-def test_facets_of_level_ground_are_the_floor(stool_walk):
+def test_facets_of_level_ground_look_like_the_floor(stool_walk):
     stage = Stage([stool_walk], 320, 180)
     camera = stage.camera(0)
     floor, facets = (
@@ -37,7 +37,7 @@ def test_facets_of_level_ground_are_the_floor(stool_walk):
     assert (np.abs(floor - facets).max(2) < 8).mean() > 0.97
 
 
-def test_the_camera_goes_up_with_the_ground(climb):
+def test_the_camera_rises_with_the_ground(climb):
     stage = Stage([climb], 320, 180)
     rows = [
         stage.camera(frame).pixels(climb.trunk_pos[frame])[1] for frame in (0, len(climb.qpos) - 1)
@@ -47,8 +47,8 @@ def test_the_camera_goes_up_with_the_ground(climb):
 
 
 @pytest.mark.parametrize(("task", "follows"), [("swim", True), ("walk", False)])
-def test_the_camera_goes_up_with_a_swimmer(stool_walk, task: str, follows: bool):
-    """Who leaps from a floor is seen to leap; who is afloat would leave the picture."""
+def test_the_camera_rises_with_a_swimmer_but_not_with_a_leap(stool_walk, task: str, follows: bool):
+    """A leap from the floor must be visible; a rising swimmer would leave the picture."""
     qpos = stool_walk.trajectory.qpos.copy()
     qpos[0, :, 2] += np.linspace(0, 2, qpos.shape[1])
     risen = dataclasses.replace(
@@ -62,7 +62,7 @@ def test_the_camera_goes_up_with_a_swimmer(stool_walk, task: str, follows: bool)
     assert 0 < stage.behind(ends[1], 0)[1] < 180, "its label stays in the picture"
 
 
-def test_pictures_differ_from_those_of_a_floor(climb):
+def test_uneven_ground_looks_different_from_a_floor(climb):
     stage = Stage([climb], 320, 180)
     camera = stage.camera(len(climb.qpos) - 1)
     drawn = np.asarray(draw_floor(camera, stage.origin, stage.relief), int)

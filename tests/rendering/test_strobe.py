@@ -1,4 +1,4 @@
-"""A way in one picture, and expressions as trees: what is drawn, and where."""
+"""Onion-skin pictures and expression trees: what is drawn, and where."""
 
 import dataclasses
 
@@ -16,14 +16,14 @@ TREE: Expression = ("ifltz", ("-", "s0", 0.25), ("*", "a0", "a1"), "t")
 
 
 def sent(walk: Walk, ways: np.ndarray) -> Walk:
-    """The walk with its trunk so far ahead, m in each frame."""
+    """The walk with its trunk moved ahead by `ways`, m in each frame."""
     qpos = np.repeat(walk.qpos[:1], len(ways), 0)
     qpos[:, :2] += ways[:, None] * walk.forward
     film = dataclasses.replace(walk.trajectory, qpos=qpos[None])
     return dataclasses.replace(walk, trajectory=film)
 
 
-def test_moments_are_evenly_far_apart_and_the_last_is_the_farthest(stool_walk: Walk):
+def test_moments_are_evenly_spaced_up_to_the_farthest_point(stool_walk: Walk):
     ways = np.concatenate([np.linspace(0, 1, 50) ** 2, np.linspace(1, 0.8, 20)])
     chosen = filmstrip.moments(sent(stool_walk, ways))
     steps = np.diff(ways[chosen])
@@ -32,19 +32,19 @@ def test_moments_are_evenly_far_apart_and_the_last_is_the_farthest(stool_walk: W
     assert abs(steps - spacing).max() < 0.2 * spacing
 
 
-def test_a_long_way_has_no_more_moments_than_a_picture_holds(stool_walk: Walk):
+def test_a_long_path_has_no_more_moments_than_a_picture_holds(stool_walk: Walk):
     assert len(filmstrip.moments(sent(stool_walk, np.linspace(0, 100, 500)))) <= filmstrip.MOST
 
 
-def test_who_stays_where_it_is_is_seen_once(stool_walk: Walk):
+def test_a_stationary_walk_is_drawn_once(stool_walk: Walk):
     assert filmstrip.moments(sent(stool_walk, np.zeros(30))).tolist() == [0]
 
 
-def test_all_of_the_way_is_in_the_picture(stool: Creature):
+def test_the_whole_path_is_in_the_picture(stool: Creature):
     walk = record_walk(stool, dataclasses.replace(treading(stool), task="hop"), 0.2)
     short, long = (filmstrip.strobe(sent(walk, np.linspace(0, way, 40))) for way in (0.2, 1.5))
     assert (short.height, long.width > 1.5 * short.width) == (long.height, True)
-    # The same floor and the same scale: at both ends a body, in the long one between them too.
+    # Same floor, same scale, and a body at both ends of the long picture.
     pixels = np.asarray(long.convert("L"), int)
     columns = np.flatnonzero(pixels[: long.height // 2].std(0) > 10)
     assert columns[0] < 0.2 * long.width

@@ -1,4 +1,4 @@
-"""`mjxgait render`: videos in the formats that people can play."""
+"""`mjxgait render`: videos in common formats."""
 
 import sys
 
@@ -39,7 +39,7 @@ def test_a_video_has_its_frames_and_moves(stool_run, tmp_path, capsys, kind):
     assert Image.open(out).info["loop"] == 0
 
 
-def test_mp4_by_the_extra(stool_run, tmp_path, capsys):
+def test_mp4_with_the_extra(stool_run, tmp_path, capsys):
     av = pytest.importorskip("av", reason="the extra [video] is not installed")
     out = tmp_path / "walk.mp4"
     assert render(capsys, stool_run, "--out", out, *SMALL)[0] == 0
@@ -71,14 +71,14 @@ def test_a_png_is_the_filmstrip(stool_run, tmp_path, capsys):
         (["--out", "walk.webp", "--top", "2"], "no checkpoint"),
     ],
 )
-def test_what_cannot_be_is_said(stool_run, capsys, monkeypatch, tmp_path, arguments, words):
+def test_bad_options_are_reported(stool_run, capsys, monkeypatch, tmp_path, arguments, words):
     monkeypatch.chdir(tmp_path)
     code, said = render(capsys, stool_run, *arguments)
     assert code == 2
     assert words in said
 
 
-def test_no_champion_is_said(stool, tmp_path, capsys):
+def test_a_missing_champion_is_reported(stool, tmp_path, capsys):
     from rendering.made_up import write_run
 
     code, said = render(capsys, write_run(tmp_path / "run", stool), "--out", tmp_path / "walk.webp")
@@ -86,7 +86,7 @@ def test_no_champion_is_said(stool, tmp_path, capsys):
     assert "no champion yet" in said
 
 
-def test_a_race_has_lanes_beside_each_other_and_labels(stool_walk):
+def test_a_race_has_parallel_lanes_and_labels(stool_walk):
     stage = Stage([stool_walk, stool_walk, stool_walk], 320, 180)
     heights = [stage.behind(50, place)[1] for place in range(3)]
     assert heights[0] > heights[1] > heights[2]
@@ -95,7 +95,7 @@ def test_a_race_has_lanes_beside_each_other_and_labels(stool_walk):
     assert next(moving_pictures(runners, stage, 10)).size == (320, 180)
 
 
-def test_the_caption_tells_speed_and_fall(stool_walk):
+def test_the_caption_gives_speed_and_fall(stool_walk):
     assert condition(stool_walk, 0.0) == "0.00 m/s"
     assert condition(stool_walk, 2.0).endswith("m/s")
     walk = record_walk(
@@ -123,12 +123,12 @@ def test_every_view_has_the_whole_creature_in_the_picture(stool_walk, view: str)
     pixels = stage.camera(0).pixels(stage.entrants[0].outline)
     assert (pixels > 0).all()
     assert (pixels < [320, 180]).all()
-    # And it fills it: half of the width or of the height at least.
+    # It fills at least half of the width or height.
     assert (np.ptp(pixels, axis=0) / [320, 180]).max() > 0.5
 
 
-def test_views_are_from_where_their_names_say(stool_walk):
-    """Which way the creature goes in the picture, and how much one looks down."""
+def test_views_are_from_the_direction_of_their_names(stool_walk):
+    """Direction of walking in the picture: to the right and into it."""
     ways = {}
     for view in VIEWS:
         camera = Stage([stool_walk], 320, 180, view).camera(0)

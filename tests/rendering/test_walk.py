@@ -1,4 +1,4 @@
-"""The recorded walk that all pictures are made of."""
+"""The recorded walk behind all pictures."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ def test_steady_strides_are_as_long_as_the_clock_says(stool_walk):
     assert np.isinf(stool_walk.fell)
 
 
-def test_targets_are_those_of_the_examiner(stool_walk):
+def test_targets_are_those_of_the_reference_controller(stool_walk):
     """Without steering and balance the target is the planned pose."""
     from mjxgait.controllers.key_poses.reference import PoseReference
 
@@ -34,11 +34,11 @@ def test_a_walk_that_falls_ends_soon_after():
     assert walk.steady_strides(8) is None
 
 
-def test_too_short_a_walk_has_no_steady_stride(stool):
+def test_a_short_walk_has_no_steady_stride(stool):
     assert record_walk(stool, treading(stool), 0.3).steady_strides(1) is None
 
 
-def test_one_that_blows_up_at_once_is_shown_standing(stool, monkeypatch):
+def test_a_walk_that_diverges_at_once_is_shown_standing(stool, monkeypatch):
     import dataclasses
 
     from mjxgait.rendering import walk as module

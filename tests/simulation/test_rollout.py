@@ -1,4 +1,4 @@
-"""Episodes on lanes: the verdict on a genome depends on nothing but the genome and the start."""
+"""Episodes on lanes: an evaluation depends only on the genome and the start."""
 
 import copy
 import dataclasses
@@ -48,7 +48,7 @@ def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
 
 
 def with_lanes(experiment: Experiment, lanes: int, devices: int) -> Experiment:
-    """And in turns of their own, as if plans differed in how much a command takes."""
+    """Other lanes and devices, and a load per plan, as if commands differed in cost."""
     mesh = jax.sharding.Mesh(np.array(jax.devices()[:devices]), ("lanes",))
     other, controller = dataclasses.replace(experiment), copy.copy(experiment.simulator.controller)
     vars(controller)["load"] = lambda plan: plan.tuning[0]
@@ -61,7 +61,7 @@ def with_lanes(experiment: Experiment, lanes: int, devices: int) -> Experiment:
 
 @cache
 def program(experiment: Experiment) -> Callable[[Genome, Starts], Episodes]:
-    """Compiled once for all that is simulated in an experiment."""
+    """One compiled program per experiment."""
     return jax.jit(experiment.simulate)
 
 
@@ -86,7 +86,7 @@ def episodes(experiment: Experiment) -> Episodes:
     return simulate(experiment, genomes(experiment, 7))
 
 
-def test_every_genome_is_judged_on_every_start(experiment: Experiment, episodes: Episodes):
+def test_every_genome_runs_on_every_start(experiment: Experiment, episodes: Episodes):
     assert episodes.stats.steps.shape == (7, 2)
     assert (episodes.stats.steps > 0).all()
     finished = episodes.stats.reason == Reason.FINISHED
@@ -97,10 +97,10 @@ def test_every_genome_is_judged_on_every_start(experiment: Experiment, episodes:
 @pytest.mark.parametrize(
     ("lanes", "devices"), [(5, 2), pytest.param(16, 1, marks=pytest.mark.thorough("other lanes"))]
 )
-def test_results_do_not_depend_on_lanes_devices_or_turns(
+def test_results_do_not_depend_on_lanes_devices_or_load(
     experiment: Experiment, episodes: Episodes, lanes: int, devices: int
 ):
-    """Other batch sizes may round differently in float32; half a second of simulation keeps that below a tenth of a millimetre."""
+    """Batch sizes may round differently in float32, by less than 0.1 mm in half a second."""
     other = simulate(with_lanes(experiment, lanes, devices), genomes(experiment, 7))
     assert np.allclose(other.stats.forward, episodes.stats.forward, atol=1e-4)
     assert (other.stats.steps == episodes.stats.steps).all()
@@ -113,7 +113,9 @@ def test_the_order_of_results_is_the_order_of_the_genomes(
     assert np.allclose(backwards.stats.forward[::-1], episodes.stats.forward, atol=1e-4)
 
 
-def test_a_bad_individual_does_not_touch_its_neighbours(experiment: Experiment, episodes: Episodes):
+def test_a_nonfinite_individual_does_not_affect_its_neighbours(
+    experiment: Experiment, episodes: Episodes
+):
     population = genomes(experiment, 7)
     poisoned = dataclasses.replace(population, key_poses=population.key_poses.at[3].set(jnp.nan))
     found = simulate(experiment, poisoned)
@@ -122,7 +124,7 @@ def test_a_bad_individual_does_not_touch_its_neighbours(experiment: Experiment, 
     assert np.allclose(found.stats.forward[others], episodes.stats.forward[others], atol=1e-4)
 
 
-def test_not_finite_means_the_lowest_score(experiment: Experiment):
+def test_a_nonfinite_genome_gets_the_lowest_score(experiment: Experiment):
     population = genomes(experiment, 7)
     poisoned = dataclasses.replace(population, key_poses=population.key_poses.at[2].set(jnp.nan))
     terms = evaluation(experiment, poisoned).terms
@@ -131,8 +133,8 @@ def test_not_finite_means_the_lowest_score(experiment: Experiment):
     assert np.isfinite(np.delete(fitness, 2)).all()
 
 
-def test_physics_that_breaks_at_once_means_the_lowest_score_too(experiment: Experiment):
-    """Nothing has been counted then, and nothing must come of it."""
+def test_physics_that_breaks_at_once_has_no_finite_terms(experiment: Experiment):
+    """No step has been counted, so there is nothing to score."""
     starts = experiment.starts
     broken = dataclasses.replace(starts, qvel=starts.qvel.at[1, 0].set(jnp.nan))
     terms = evaluation(experiment, genomes(experiment, 7), broken).terms
@@ -161,7 +163,9 @@ def start_at(experiment: Experiment, height: float = 0.0, roll: float = 0.0) -> 
         ({"height": -0.1}, Reason.TOUCHED),
     ],
 )
-def test_an_episode_ends_at_once_and_says_why(experiment: Experiment, start: dict, reason: Reason):
+def test_an_episode_ends_at_once_with_its_reason(
+    experiment: Experiment, start: dict, reason: Reason
+):
     found = simulate(experiment, genomes(experiment, 7), start_at(experiment, **start)).stats
     assert (found.reason == reason).all()
     assert (found.steps == 0).all()
@@ -169,7 +173,7 @@ def test_an_episode_ends_at_once_and_says_why(experiment: Experiment, start: dic
 
 
 def standing(experiment: Experiment, low: float = 0.1, **others: jax.Array) -> Sensed:
-    """What is sensed of a body that stands as in its pose, its watched parts so low, but for others."""
+    """Observations in the standing pose, with watched parts at height `low`; `others` override."""
     creature = experiment.creature
     joints, zero = jnp.zeros(len(creature.joints.names)), jnp.zeros(3)
     usual = {
@@ -189,7 +193,9 @@ def standing(experiment: Experiment, low: float = 0.1, **others: jax.Array) -> S
 def reason_to_end(
     experiment: Experiment, height: float = 1.0, up: float = 1.0, low: float = 0.1
 ) -> Reason:
-    """What is said of a creature as high above its stand, its trunk so upright, other parts so low."""
+    """Why an episode ends. height: of the trunk, in standing heights. up: cosine of its tilt.
+    low: height of the watched parts, m.
+    """
     tilt = np.arccos(up)
     turned = [[1, 0, 0], [0, np.cos(tilt), -np.sin(tilt)], [0, np.sin(tilt), np.cos(tilt)]]
     sensed = standing(
@@ -223,19 +229,19 @@ WRONG = {
 def test_the_settings_decide_what_ends_an_episode(
     stool: Creature, settings: dict, ends: set[Reason]
 ):
-    """What they do not say is as the creature has it."""
+    """Other settings come from the creature."""
     asked = build_experiment(stool, small_config(rollout=settings))
     for reason, moment in WRONG.items():
         assert reason_to_end(asked, **moment) == (reason if reason in ends else Reason.FINISHED)
 
 
-def test_nothing_but_a_failed_computation_ends_an_episode_that_is_not_to_end(stool: Creature):
+def test_without_termination_only_nonfinite_values_end_an_episode(stool: Creature):
     endless = build_experiment(stool, small_config(rollout={"terminate": False}))
     assert reason_to_end(endless, height=float("nan")) == Reason.NONFINITE
 
 
 def test_the_dead_are_not_judged_on(experiment: Experiment):
-    """Whatever a body does after its episode has ended: here it stands well again."""
+    """Statistics do not change after an episode has ended, even if the body stands well again."""
     simulator, starts = experiment.simulator, experiment.starts
     creature, fast = experiment.creature, jnp.full(3, 2.0)
     stats = dataclasses.replace(simulator.task.init(), steps=jnp.int32(7), forward=jnp.float32(0.3))
@@ -262,8 +268,8 @@ def test_the_dead_are_not_judged_on(experiment: Experiment):
 
 
 @pytest.mark.thorough("test_the_dead_are_not_judged_on asks the same of one step")
-def test_death_freezes_the_statistics(experiment: Experiment, stool: Creature):
-    """A longer episode adds nothing to an individual that has died."""
+def test_statistics_stop_at_the_end_of_an_episode(experiment: Experiment, stool: Creature):
+    """A longer episode adds nothing to an individual that has fallen."""
     long = build_experiment(stool, small_config(rollout={"lanes": 3, "seconds": 0.8}))
     population = genomes(long, 7)
     leaning = start_at(experiment, height=0.1, roll=0.9)
@@ -297,7 +303,7 @@ def test_the_first_start_is_nominal_and_the_others_are_not(stool: Creature):
 
 
 def standing_terms(experiment: Experiment) -> dict[str, float]:
-    """The terms of an individual whose key poses are the standing pose."""
+    """The terms of an individual with all key poses equal to the standing pose."""
     still = genomes(experiment, 7)
     poses = jnp.broadcast_to(
         jnp.asarray(experiment.creature.joints.stand, jnp.float32), still.key_poses.shape
@@ -312,16 +318,16 @@ def standing_terms(experiment: Experiment) -> dict[str, float]:
     return {name: float(value) for name, value in terms.items()}
 
 
-def test_terms_of_one_that_stands_still(experiment: Experiment):
+def test_terms_of_an_individual_that_stands_still(experiment: Experiment):
     terms = standing_terms(experiment)
-    # Up to the end, and nowhere.
+    # Upright to the end, without progress.
     assert terms["alive"] == pytest.approx(0.25, abs=1e-3)
     for name in set(TERMS) - {"alive"}:
         assert terms[name] == pytest.approx(0.0, abs=0.02), name
 
 
-def test_style_counts_in_proportion_to_the_walk(experiment: Experiment):
-    """A foot that never leaves the floor costs nothing while there is no walk, and the whole of its weight at the wanted speed."""
+def test_style_counts_in_proportion_to_progress(experiment: Experiment):
+    """A dragging foot costs nothing without progress, and its full weight at the target speed."""
     creature, config, horizon = (
         experiment.creature,
         experiment.config.fitness,
@@ -338,7 +344,7 @@ def test_style_counts_in_proportion_to_the_walk(experiment: Experiment):
         assert float(terms["clearance"]) == pytest.approx(share, abs=1e-5)
 
 
-def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
+def test_distance_beyond_the_target_speed_counts_little(experiment: Experiment):
     creature, config, horizon = (
         experiment.creature,
         experiment.config.fitness,
@@ -355,8 +361,8 @@ def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
     assert float(metres) == pytest.approx(3 * lengths * creature.frame.body_length, rel=1e-4)
 
 
-def test_a_fall_scores_below_everybody_who_stays_up(experiment: Experiment, stool: Creature):
-    """With the weights of configs/wilson.toml, whatever the distance; by default it costs nothing."""
+def test_a_fall_scores_below_all_that_stay_up(experiment: Experiment, stool: Creature):
+    """With the weights of configs/wilson.toml, at any distance; by default a fall costs nothing."""
     thesis = resolve_config({}, stool.name, Path("wilson"))
     steps, evaluate = experiment.simulator.steps, experiment.simulator.task
 
@@ -417,7 +423,7 @@ LARGER = pytest.mark.thorough("the same on the stool")
     ids=lambda folder: folder.name,
 )
 def test_mjx_agrees_with_c_mujoco(folder: Path):
-    """The same controlled motion, 60 steps through touchdown, in float32 MJX and in float64 C MuJoCo."""
+    """Equal controlled motion, 60 steps through touchdown, in float32 MJX and float64 C MuJoCo."""
     creature, config = load_creature(folder), Config()
     experiment = build_experiment(
         creature,

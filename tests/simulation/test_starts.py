@@ -1,4 +1,4 @@
-"""Each perturbation of the starts, alone; that they reach the motion, the episode parity shows."""
+"""Each perturbation of the starts alone. `test_episode_parity` shows that they reach the motion."""
 
 import dataclasses
 
@@ -47,7 +47,7 @@ def differing(one: Starts, other: Starts) -> set[str]:
     ],
     ids=["joints displaced", "joints moving", "friction", "push"],
 )
-def test_a_perturbation_changes_its_own_field_of_all_but_the_first_start(
+def test_a_perturbation_changes_only_its_field_except_in_the_first_start(
     stool: Creature, perturbation: dict, field: str
 ):
     starts, none = drawn(stool, **perturbation), drawn(stool)
@@ -57,7 +57,7 @@ def test_a_perturbation_changes_its_own_field_of_all_but_the_first_start(
     assert all(not np.array_equal(row, nominal[0]) for row in values[1:])
 
 
-def test_noise_fills_its_width_to_both_sides_and_is_that_of_joints_only(stool: Creature):
+def test_noise_fills_its_range_on_both_sides_for_joints_only(stool: Creature):
     starts = drawn(stool, joint_noise=0.1, velocity_noise=0.5)
     shift = starts.qpos - np.float32(stool.stand_qpos)
     for noise, places, width in (
@@ -69,7 +69,7 @@ def test_noise_fills_its_width_to_both_sides_and_is_that_of_joints_only(stool: C
         assert not np.delete(noise, places, axis=1).any()
 
 
-def test_each_joint_has_gains_of_its_own(stool: Creature):
+def test_each_joint_has_its_own_gains(stool: Creature):
     starts = drawn(stool, gains=0.2)
     for factors in (starts.stiffness, starts.damping):
         assert (factors[0] == 1).all()
@@ -85,7 +85,7 @@ def test_friction_lies_within_its_range(stool: Creature):
     assert 1.35 < friction.max() <= 1.4
 
 
-def test_pushes_go_all_ways_along_the_ground_in_the_middle_of_the_episode(stool: Creature):
+def test_pushes_are_horizontal_in_all_directions_and_mid_episode(stool: Creature):
     starts = drawn(stool, push=0.2)
     push = starts.push[1:]
     assert not push[:, 2:].any()
@@ -95,7 +95,7 @@ def test_pushes_go_all_ways_along_the_ground_in_the_middle_of_the_episode(stool:
     assert ((starts.push_step[1:] >= 100) & (starts.push_step[1:] < 300)).all()
 
 
-def test_each_part_has_a_mass_of_its_own_but_in_the_first_start(stool: Creature):
+def test_each_part_has_its_own_mass_except_in_the_first_start(stool: Creature):
     starts = drawn(stool, masses=0.2)
     assert differing(starts, drawn(stool)) == {"mass_scale"}
     assert starts.mass_scale.shape == (COUNT, stool.model.nbody - 1)
@@ -104,7 +104,7 @@ def test_each_part_has_a_mass_of_its_own_but_in_the_first_start(stool: Creature)
     assert 0.8 <= starts.mass_scale[1:].min() < 0.82
 
 
-def test_torques_are_up_to_so_many_steps_late_but_in_the_first_start(stool: Creature):
+def test_torques_are_delayed_up_to_the_latency_except_in_the_first_start(stool: Creature):
     assert drawn(stool).delay is None
     delay = drawn(stool, latency=2).delay
     assert delay[0] == 0
@@ -113,12 +113,12 @@ def test_torques_are_up_to_so_many_steps_late_but_in_the_first_start(stool: Crea
 
 @pytest.fixture(scope="module")
 def weighed(stool: Creature) -> Experiment:
-    """A run whose starts differ in nothing but the masses."""
+    """A run with starts that differ only in the masses."""
     return build_experiment(stool, small_config(rollout={**NONE, "masses": 0.2, "starts": 3}))
 
 
-def test_the_bodies_of_a_run_weigh_what_their_starts_say(weighed: Experiment):
-    """All that follows from the masses is reckoned too: `Plant.heavier`, whose own tests compare C."""
+def test_bodies_have_the_masses_of_their_starts(weighed: Experiment):
+    """So are all derived numbers, by `Plant.with_mass_scale`; its own tests compare C MuJoCo."""
     simulator, starts, settings = weighed.simulator, weighed.starts, weighed.row.settings
     plain = simulator.plant.parameters
     masses = jax.jit(simulator.plant.with_mass_scale)(plain, starts.mass_scale[1])
@@ -128,7 +128,7 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(weighed: Experiment):
 
     @jax.jit
     def lane() -> BodyState:
-        """In the second start."""
+        """The body of a lane in the second start."""
         prepare = jax.vmap(jax.vmap(simulator.controller.prepare, (0, None)))
         plans = prepare(genomes, rows[-1].controller)
         job = jnp.int32(0)
@@ -141,18 +141,18 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(weighed: Experiment):
 
 
 @pytest.mark.thorough("test_evolve_body.py has a body per lane in episodes")
-def test_where_the_masses_count_everybody_moves_otherwise(weighed: Experiment):
-    """Nothing else tells the starts apart."""
+def test_other_masses_change_every_motion(weighed: Experiment):
+    """The starts differ in nothing else."""
     forward = jax.jit(weighed.simulate)(weighed.init().genomes).stats.forward
     assert np.abs(np.diff(forward, axis=1)).max() > 1e-5
 
 
-def test_every_command_that_holds_ends_with_a_round():
-    """Else lanes that take an episode in the middle of a command would begin with another's."""
+def test_every_held_command_ends_with_a_round():
+    """Else a lane could begin an episode with the command of the previous one."""
     assert all(CHECK_EVERY % steps == 0 for steps in HOLDS)
 
 
-def test_each_generation_has_other_starts_until_all_have_had_their_turn(stool: Creature):
+def test_generations_have_different_starts_until_the_cycle_repeats(stool: Creature):
     config = small_config(
         rollout={"starts": 3, "variety": 4, "friction": (0.6, 1.4)},
         evolution={"survival": "children", "elite": 0.1},
@@ -172,8 +172,8 @@ def test_each_generation_has_other_starts_until_all_have_had_their_turn(stool: C
     assert rounds[4] == rounds[0]
 
 
-def test_disturbances_grow_in_so_many_steps_to_their_full_size(stool: Creature):
-    """As compiled, as it is run; without steps trials are as hard as they will be, and never harder."""
+def test_disturbances_grow_to_full_size_in_the_given_steps(stool: Creature):
+    """Compiled, as in a run. Without steps, trials have full difficulty from the beginning."""
     rollout = {"seconds": 0.4, "starts": 5, "latency": 4, "promote": 1.0}
     row, plain, long = (
         build_experiment(stool, small_config(rollout=rollout, fitness={"hardening": steps}))
@@ -208,7 +208,7 @@ def test_disturbances_grow_in_so_many_steps_to_their_full_size(stool: Creature):
 
 
 @pytest.mark.parametrize(("fallen", "ready"), [(0.0, True), (0.2, True), (0.4, False)])
-def test_who_hardly_falls_is_ready_for_harder_trials(stool: Creature, fallen: float, ready: bool):
+def test_few_falls_lead_to_harder_trials(stool: Creature, fallen: float, ready: bool):
     task = build_experiment(stool, small_config(fitness={"hardening": 3})).simulator.task
     assert task.has_curriculum
     assert task.levels(task.settings) == 3

@@ -1,4 +1,4 @@
-"""Checkpoints: whole or refused, each refusal with a way out."""
+"""Checkpoints are whole or refused; each refusal names a way out."""
 
 import dataclasses
 import json
@@ -41,7 +41,7 @@ def states(evolution) -> list[EvolutionState]:
 
 @pytest.fixture
 def run(tmp_path: Path, states: list[EvolutionState]) -> Path:
-    """A run folder with the checkpoints of generations 0 to 6, of which every third is kept."""
+    """A run folder with checkpoints of generations 0 to 6, every third of which is kept."""
     checkpoints = Checkpoints(tmp_path, keep_every=3)
     for state in states:
         checkpoints.save(state, "toy", DIGEST)
@@ -59,7 +59,7 @@ def test_the_latest_three_and_every_third_are_kept(run: Path):
     assert Checkpoints(run).generations() == [0, 3, 4, 5, 6]
 
 
-def test_what_comes_back_is_what_was_saved_to_the_bit(
+def test_a_restored_state_equals_the_saved_one_bit_for_bit(
     run: Path, states: list[EvolutionState], evolution
 ):
     for wanted, generation in ((states[6], None), (states[3], 3)):
@@ -71,7 +71,7 @@ def test_what_comes_back_is_what_was_saved_to_the_bit(
             assert np.array_equal(a, b)
 
 
-def test_the_restored_key_goes_on_where_the_saved_one_was(
+def test_a_restored_key_continues_the_saved_sequence(
     run: Path, states: list[EvolutionState], evolution
 ):
     restored, whole = (
@@ -110,7 +110,7 @@ def test_a_cut_off_checkpoint_is_refused(run: Path, evolution):
 
 
 def test_values_changed_by_hand_are_noticed(run: Path, evolution):
-    """Even where the storage format has no reason to complain: the manifest knows the values."""
+    """Even where the storage format finds no error: the manifest has a hash of the values."""
     manifest = run / FOLDER / "6" / "manifest" / "metadata"
     manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"arrays": "0" * 64}))
     with pytest.raises(UserError, match="not those that were written"):
@@ -136,7 +136,7 @@ def test_other_settings_are_refused_with_the_array_that_differs(run: Path):
         restore(run, toy(population=12))
 
 
-def test_a_generation_that_is_not_there_lists_those_that_are(run: Path, evolution):
+def test_a_missing_generation_lists_the_stored_ones(run: Path, evolution):
     with pytest.raises(UserError, match="no checkpoint of generation 2; there are 0, 3, 4, 5, 6"):
         restore(run, evolution, generation=2)
 
@@ -153,7 +153,7 @@ def test_a_half_written_checkpoint_does_not_count(run: Path, evolution):
     assert int(restore(run, evolution).generation) == 6
 
 
-def test_going_on_from_an_earlier_checkpoint_drops_the_later_ones(
+def test_resuming_an_earlier_checkpoint_drops_the_later_ones(
     run: Path, states: list[EvolutionState], evolution
 ):
     (run / FOLDER / "notes.txt").write_text("the user's own")
@@ -172,7 +172,7 @@ def test_nothing_is_dropped_where_nothing_is_later(run: Path):
 
 
 def test_a_damaged_checkpoint_is_dropped_too(run: Path, states: list[EvolutionState]):
-    """The way out that a damaged checkpoint is answered with is a way."""
+    """The way out offered for a damaged checkpoint works."""
     corrupt(run, 6)
     checkpoints = Checkpoints(run)
     assert checkpoints.drop_after(5) == [6]
@@ -181,7 +181,7 @@ def test_a_damaged_checkpoint_is_dropped_too(run: Path, states: list[EvolutionSt
     assert Checkpoints(run).generations()[-1] == 6
 
 
-def test_a_mistake_of_ours_is_not_blamed_on_the_disk(
+def test_a_program_error_is_not_blamed_on_the_disk(
     tmp_path: Path, states: list[EvolutionState], monkeypatch: pytest.MonkeyPatch
 ):
     checkpoints = Checkpoints(tmp_path)
@@ -227,11 +227,8 @@ for folder in sys.argv[1:]:
 """
 
 
-def test_a_disk_that_fills_is_one_sentence_and_nothing_else_on_the_screen(tmp_path: Path):
-    """Files may not grow over 100 bytes, which stands for a full disk.
-
-    It fills before room is tried, and after the trial.
-    """
+def test_a_full_disk_prints_one_sentence_and_nothing_else(tmp_path: Path):
+    """A limit of 100 bytes per file stands for a full disk, before and after the check for room."""
     folders = [tmp_path / moment for moment in ("before", "after the trial")]
     done = subprocess.run(
         [sys.executable, "-c", FILLS, *map(str, folders)],

@@ -1,4 +1,4 @@
-"""A damaged file of a run folder is one sentence: every field is changed into everything that it may not be."""
+"""A damaged file of a run folder gives one sentence, whatever invalid value a field has."""
 
 import copy
 import dataclasses
@@ -52,7 +52,7 @@ EXAMPLES = settings(
 
 
 def places(value: Any, path: tuple = ()) -> Iterator[tuple]:
-    """Where something stands in a document, itself included."""
+    """All paths in a document, the empty one included."""
     yield path
     inner = dict(enumerate(value)) if isinstance(value, list) else value
     for key, one in inner.items() if isinstance(inner, dict) else ():
@@ -60,7 +60,7 @@ def places(value: Any, path: tuple = ()) -> Iterator[tuple]:
 
 
 def changed(document: Any, path: tuple, value: Any) -> Any:
-    """A copy with another value at a place, or without it."""
+    """A copy with another value at a path, or without that field."""
     if not path:
         return value if value is not GONE else {}
     found = copy.deepcopy(document)
@@ -75,7 +75,7 @@ def changed(document: Any, path: tuple, value: Any) -> Any:
 
 
 def is_one_sentence(read: Callable[[], object], named: str) -> bool:
-    """Whether it is read, or refused in a sentence that names the file."""
+    """Whether reading succeeds, or fails with one sentence that names the file."""
     try:
         read()
     except UserError as error:
@@ -120,7 +120,9 @@ def certificate_of(champion: Any) -> dict[str, Any]:
 
 @EXAMPLES
 @given(data=st.data())
-def test_a_champion(data: st.DataObject, stool: Creature, tmp_path: Path):
+def test_a_damaged_champion_gives_one_sentence(
+    data: st.DataObject, stool: Creature, tmp_path: Path
+):
     path = tmp_path / CHAMPION
     write_champion(treading(stool), stool, path)
     document = json.loads(path.read_text())
@@ -141,7 +143,9 @@ def test_a_champion(data: st.DataObject, stool: Creature, tmp_path: Path):
 
 @EXAMPLES
 @given(data=st.data())
-def test_a_certificate(data: st.DataObject, stool: Creature, tmp_path: Path):
+def test_a_damaged_certificate_gives_one_sentence(
+    data: st.DataObject, stool: Creature, tmp_path: Path
+):
     champion, path = treading(stool), tmp_path / CERTIFICATE
     document = certificate_of(champion)
     place = data.draw(st.sampled_from(list(places(document))))
@@ -156,7 +160,7 @@ def test_a_certificate(data: st.DataObject, stool: Creature, tmp_path: Path):
 
 
 @pytest.mark.parametrize("value", ["half", None, True, -0.1, 1e9, [0.5]])
-def test_what_a_stress_test_found(value: Any, stool: Creature, tmp_path: Path):
+def test_a_damaged_stress_result_gives_one_sentence(value: Any, stool: Creature, tmp_path: Path):
     path, champion = tmp_path / "stress.json", treading(stool)
     trials = [{"name": "bumps", "share": value, "passed": False}]
     told = {"schema": 1, "champion": champion.fingerprint, "passed": False, "trials": trials}
@@ -167,7 +171,7 @@ def test_what_a_stress_test_found(value: Any, stool: Creature, tmp_path: Path):
 
 @EXAMPLES
 @given(data=st.data())
-def test_a_log(data: st.DataObject, tmp_path: Path):
+def test_a_damaged_log_gives_one_sentence(data: st.DataObject, tmp_path: Path):
     line = metrics_line(1) | {"mothers": [0, 1]}
     place = data.draw(st.sampled_from(list(places(line))))
     spoilt = changed(line, place, data.draw(st.sampled_from(HOSTILE)))
@@ -179,7 +183,7 @@ def test_a_log(data: st.DataObject, tmp_path: Path):
 @pytest.mark.parametrize(
     "text", ["5", "[1, 2]", "{}", '{"generation": "1"}', "\x00", '{"passed": 1}']
 )
-def test_other_logs(text: str, tmp_path: Path):
+def test_other_damaged_logs_give_one_sentence(text: str, tmp_path: Path):
     exams = tmp_path / "exams.jsonl"
     exams.write_text(f"{text}\n")
     with pytest.raises(UserError, match=r"exams\.jsonl, line 1: .*take the line out"):
@@ -190,14 +194,14 @@ def test_other_logs(text: str, tmp_path: Path):
         island_facts(tmp_path, 3)
 
 
-def test_what_is_no_number_is_no_checkpoint(tmp_path: Path):
+def test_only_folders_named_by_a_number_are_checkpoints(tmp_path: Path):
     for name in ("3", "²", "٣", "4.tmp"):
         (tmp_path / FOLDER / name).mkdir(parents=True)
     assert stored_generations(tmp_path) == [3]
 
 
 def test_stored_settings_are_whole_or_refused(stool: Creature, tmp_path: Path):
-    """What a default would put in the place of a lost table is another run."""
+    """A default in place of a lost table would be another run."""
     run = write_run(tmp_path / "run", stool)
     table = tomllib.loads((run / CONFIG).read_text())
     assert open_run(run)[1] == Config()
@@ -207,7 +211,7 @@ def test_stored_settings_are_whole_or_refused(stool: Creature, tmp_path: Path):
             open_run(run)
 
 
-def test_a_full_disk_leaves_the_certificate(
+def test_a_full_disk_keeps_the_old_certificate(
     stool: Creature, tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch
 ):
     run = write_run(tmp_path / "run", stool, treading(stool))
@@ -227,7 +231,7 @@ def test_a_full_disk_leaves_the_certificate(
     assert (run / CERTIFICATE).read_text() == "old"
 
 
-def test_the_page_says_what_is_wrong_with_a_log(stool: Creature, tmp_path: Path):
+def test_the_page_shows_the_error_of_a_damaged_log(stool: Creature, tmp_path: Path):
     run = write_run(tmp_path / "run", stool, generations=2)
     watcher = Watcher(run)
     (run / METRICS).write_text("5\n")
@@ -236,7 +240,7 @@ def test_the_page_says_what_is_wrong_with_a_log(stool: Creature, tmp_path: Path)
     assert f"{METRICS}, line 1" in state["what"]
 
 
-def test_names_of_runs_are_no_markup(tmp_path: Path, capsys):
+def test_run_names_are_not_read_as_markup(tmp_path: Path, capsys):
     run = tmp_path / "[red]run"
     run.mkdir()
     (run / CONFIG).write_text("damaged")
@@ -244,7 +248,7 @@ def test_names_of_runs_are_no_markup(tmp_path: Path, capsys):
 
 
 @pytest.mark.parametrize("name", ["", "../x", "a/b", "-x", ".x", "x" * 101, "a:b", "x "])
-def test_a_creatures_name_is_one_that_a_file_can_have(name: str, stool: Creature, tmp_path: Path):
+def test_a_creature_name_must_be_a_valid_file_name(name: str, stool: Creature, tmp_path: Path):
     for file, text in stool.files.items():
         (tmp_path / file).write_text(text.replace('"stool"', json.dumps(name), 1))
     with pytest.raises(UserError, match=r"creature\.toml: .*name"):

@@ -1,4 +1,4 @@
-"""What a disk refuses becomes one sentence with a way out; a mistake of ours stays what it is."""
+"""Disk errors become one sentence with a way out; other errors stay as they are."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ WRAPPED = (
     'RESOURCE_EXHAUSTED: Error writing local file "runs/a/_sharding": Failed writing: '
     "Failed to write 1531 bytes to file 8: No space left on device [os_error_code='28']"
 )
-"""How TensorStore tells of a full disk."""
+"""TensorStore's message for a full disk."""
 
 
 @pytest.mark.parametrize(
@@ -30,7 +30,7 @@ WRAPPED = (
     ],
     ids=["full", "quota", "read-only", "forbidden", "gone", "full, by TensorStore"],
 )
-def test_what_a_disk_raises_is_one_sentence(error: Exception, words: str):
+def test_a_disk_error_gives_one_sentence(error: Exception, words: str):
     with pytest.raises(UserError, match=f"^runs/a: cannot be written: .*{words}"), disk_errors(RUN):
         raise error
 
@@ -47,13 +47,13 @@ def test_what_a_disk_raises_is_one_sentence(error: Exception, words: str):
     ],
     ids=lambda error: type(error).__name__,
 )
-def test_any_other_error_goes_through_as_it_is(error: Exception):
+def test_any_other_error_is_unchanged(error: Exception):
     with pytest.raises(type(error)) as caught, disk_errors(RUN):
         raise error
     assert caught.value is error
 
 
-def test_who_writes_says_what_is_safe_and_what_to_do():
+def test_the_caller_states_what_is_safe_and_what_to_do():
     words = "^a.png: .*; the run itself is safe: make room and draw it again$"
     with (
         pytest.raises(UserError, match=words),
@@ -62,7 +62,7 @@ def test_who_writes_says_what_is_safe_and_what_to_do():
         raise OSError(errno.ENOSPC, "x")
 
 
-def test_room_is_tried_without_a_trace(tmp_path: Path):
+def test_checking_for_room_leaves_no_file(tmp_path: Path):
     try_room(tmp_path, 100_000)
     assert not list(tmp_path.iterdir())
     with pytest.raises(OSError, match="No such file"):
@@ -70,7 +70,7 @@ def test_room_is_tried_without_a_trace(tmp_path: Path):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full, a full disk")
-def test_a_disk_that_is_full_when_the_curve_is_drawn_is_one_sentence(tmp_path: Path):
+def test_a_full_disk_while_drawing_the_curve_gives_one_sentence(tmp_path: Path):
     (tmp_path / "fitness.png").symlink_to("/dev/full")
     names = ("best", "mean", "lower_quartile", "upper_quartile")
     line = '{"generation": %d, "forced": false, ' + ", ".join(f'"{n}": 1.0' for n in names) + "}\n"
@@ -79,7 +79,7 @@ def test_a_disk_that_is_full_when_the_curve_is_drawn_is_one_sentence(tmp_path: P
         _plot_fitness(tmp_path)
 
 
-def test_whether_a_file_can_be_written_is_known_before_and_leaves_nothing(tmp_path: Path):
+def test_checking_that_a_file_is_writable_changes_nothing(tmp_path: Path):
     kept = tmp_path / "kept.txt"
     kept.write_text("as it was")
     require_writable(kept)

@@ -1,4 +1,4 @@
-"""Proportions as genes: the numbers of a lane's body are those of the scaled files."""
+"""Proportions as genes: a lane's body equals the one in the scaled files."""
 
 from typing import Any
 
@@ -52,20 +52,20 @@ def test_mirrored_parts_share_a_size(shipped: Creature):
 
 OF_MODEL = ("body_iquat", "body_inertia", "body_pos", "qpos0", "qpos_spring")
 APART = {".axes", ".inertia", ".pos", *(f".model['{name}']" for name in OF_MODEL)}
-"""Compared apart: of equal moments of inertia any axes will do, and where the root was in the file
-is of no matter.
+"""Compared separately: equal moments of inertia allow any axes, and the root's place in the file
+does not matter.
 """
 
 
 def rootless(numbers: Any) -> np.ndarray:
-    """Places of the bodies below the root, m."""
+    """Positions of the bodies below the root, m."""
     if hasattr(numbers, "pos"):
         return np.asarray(numbers.pos)[1:]
     return np.asarray(numbers.model["body_pos"])[2:]
 
 
 def tensors(numbers: Any) -> np.ndarray:
-    """[B, 3, 3] of the parts, in units of the largest moment."""
+    """Inertia tensors [B, 3, 3] of the parts, in units of the largest moment."""
     if hasattr(numbers, "inertia"):
         first, second = np.moveaxis(np.asarray(numbers.axes, float), 1, 0)
         axes = np.stack([first, second, np.cross(first, second)], axis=2)
@@ -86,17 +86,17 @@ LARGER = pytest.mark.thorough("luxo shows it on nested parts, and the stool on m
     ["luxo", *(pytest.param(name, marks=LARGER) for name in ("crab", "duck"))],
     indirect=True,
 )
-def test_a_lanes_body_is_the_one_in_the_scaled_files(shipped: Creature):
+def test_a_lanes_body_equals_the_one_in_the_scaled_files(shipped: Creature):
     compare_with_the_scaled_files(shipped, fast_plant)
 
 
 @pytest.mark.parametrize("make", [fast_plant, mjx_plant])
-def test_so_it_is_on_the_stool(stool: Creature, make: Any):
+def test_a_lanes_stool_equals_the_scaled_files_in_both_plants(stool: Creature, make: Any):
     compare_with_the_scaled_files(stool, make)
 
 
 def compare_with_the_scaled_files(shipped: Creature, make: Any) -> None:
-    """Every number that the plant reads, from places to the weights of constraints."""
+    """Compare every number that the plant reads, from positions to constraint weights."""
     known, sizes = proportions(shipped), some_sizes(shipped, 3)
     layout, touch = observation_layout(shipped), shipped.settings.termination.touch
     plant = make(shipped.model_where(touch), layout, None)
@@ -116,24 +116,24 @@ def compare_with_the_scaled_files(shipped: Creature, make: Any) -> None:
 
 
 @pytest.mark.parametrize("shipped", ["crab", "luxo"], indirect=True)
-def test_it_stands_as_high_above_the_floor(shipped: Creature):
+def test_a_grown_body_starts_at_the_height_of_the_scaled_files(shipped: Creature):
     known, sizes = proportions(shipped), some_sizes(shipped, 4)
     plant = fast_plant(shipped.model, observation_layout(shipped), None)
     config = mjxgait.config.schema.RolloutConfig(starts=1)
     start = jax.tree.map(lambda x: x[0], draw_starts(key_of(0), shipped, config))
-    # Compiled for the place alone, for the body's other numbers take the compiler ten seconds.
+    # Only the position is compiled; the body's other numbers take the compiler ten seconds.
     place = jax.jit(lambda genome: SizeGrowth(known).body(plant, genome, start).qpos)
     other = grown(shipped, known.by_part(sizes))
     grew = place(Bodied({}, jnp.float32(sizes)))
     np.testing.assert_allclose(grew, other.stand_qpos, atol=2e-5)
-    # What stands on its trunk, which keeps its size, stands as it did.
+    # The trunk keeps its size, so a body that stands on it stands as before.
     stands_on_its_trunk = shipped.model.body(shipped.trunk).name in shipped.feet.names
     moved = abs(other.stand_qpos - shipped.stand_qpos).max() > 1e-3
     assert moved != stands_on_its_trunk
 
 
-def test_bars_that_are_watched_grow_with_their_parts(stool: Creature):
-    """Alike factors scale every depth alike."""
+def test_watched_bars_grow_with_their_parts(stool: Creature):
+    """Equal factors scale every depth equally."""
     plant = fast_plant(stool.evolution_model, observation_layout(stool), find_crossings(stool))
     assert plant.topology.first
     grew = jax.jit(plant.with_length_scale)(plant.parameters, jnp.full(stool.model.nbody - 1, 1.2))
@@ -156,7 +156,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> mjxgait.Run:
         return mjxgait.train(STOOL, out=out, **small)
 
 
-def test_the_run_keeps_the_body_that_won(run: mjxgait.Run):
+def test_the_run_stores_the_champions_body(run: mjxgait.Run):
     champion, body = run.champion, load_creature(run.folder / BODY)
     assert champion.sizes
     assert all(1 / MOST <= f <= MOST for f in champion.sizes.values())
@@ -166,8 +166,8 @@ def test_the_run_keeps_the_body_that_won(run: mjxgait.Run):
     assert run.certificate["creature_digest"] == body.digest
 
 
-def test_the_champion_moves_in_c_mujoco_as_it_did_in_evolution(run: mjxgait.Run):
-    """Everybody of the population with a body of their own, and not with the one they came from."""
+def test_individuals_move_in_c_mujoco_as_in_evolution(run: mjxgait.Run):
+    """Each individual with its own body, and not with the original one."""
     snapshot = read_snapshot(run.folder)
     told = snapshot.arrays["outcome"][:, 0, 0]
     everybody = [snapshot.champion(rank + 1) for rank in range(len(told))]
@@ -182,7 +182,7 @@ def test_the_champion_moves_in_c_mujoco_as_it_did_in_evolution(run: mjxgait.Run)
     assert abs(own - told).sum() < 0.3 * abs(ancestors - told).sum()
 
 
-def test_it_is_told_of_and_shown(run: mjxgait.Run):
+def test_the_sizes_are_in_the_snapshot_its_facts_and_the_walk(run: mjxgait.Run):
     snapshot = read_snapshot(run.folder)
     best = snapshot.champion(1)
     kept = read_champion(run.folder / CHAMPION, snapshot.creature)
@@ -192,6 +192,6 @@ def test_it_is_told_of_and_shown(run: mjxgait.Run):
     assert len(mjxgait.walk(run, 0.3)["time"]) > 10
 
 
-def test_sizes_out_of_reason_are_one_sentence(capsys: pytest.CaptureFixture):
+def test_an_unreasonable_body_range_gives_one_sentence(capsys: pytest.CaptureFixture):
     told = said_by(capsys, "train", "--env", "tall_quadruped", "--evolve-body", 9, code=2)
     assert "evolution.body" in told

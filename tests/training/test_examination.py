@@ -1,4 +1,4 @@
-"""When a run looks at its best, and when that ends it."""
+"""When a run validates its best individuals, and when that ends the run."""
 
 import concurrent.futures
 import dataclasses
@@ -46,7 +46,7 @@ SECONDS = 0.4
 
 
 def certificate(margin: float, attempts: int = 1) -> Certificate:
-    """One that depends on a single measure."""
+    """A certificate with a single measure."""
     measure = Measure("speed", 0.5 + margin, ">=", 0.5, 1.0)
     return Certificate(
         "stool",
@@ -73,7 +73,7 @@ def experiment() -> Experiment:
 def state_with(
     experiment: Experiment, generation: int, speed: float = 0.7, alive: float = 1.0
 ) -> EvolutionState:
-    """A population whose best walks at a speed in body lengths/s on both starts."""
+    """A population with a best that walks at `speed`, in body lengths/s, on both starts."""
     state, names = experiment.init(), experiment.simulator.task.outcomes
     best = np.zeros(state.outcome.shape[1:], np.float32)
     best[:, names.index("forward")] = speed * SECONDS * experiment.creature.frame.body_length
@@ -87,7 +87,7 @@ def state_with(
 
 
 class Looks:
-    """What the examiner will say, the last of a list over and over, and what it was asked."""
+    """Scripted results of the checks (the last of a list repeats), and a record of the calls."""
 
     def __init__(self) -> None:
         self.glances, self.rehearsals, self.certificates = [0.3], [0.3], [0.3]
@@ -127,14 +127,14 @@ def exams(tmp_path: Path) -> Exams:
     return Exams(tmp_path / "exams.jsonl")
 
 
-def test_it_looks_every_few_generations_and_not_at_the_first():
+def test_validation_is_due_every_few_generations_but_not_at_the_first():
     settings = ExaminationConfig(every=5)
     assert [g for g in range(-1, 21) if due(settings, g)] == [5, 10, 15, 20]
     assert not any(due(ExaminationConfig(every=0), g) for g in range(20))
     assert not any(due(ExaminationConfig(candidates=0), g) for g in range(20))
 
 
-def test_the_draw_to_choose_on_counts_with_the_caution_of_the_settings(
+def test_trial_runs_use_the_caution_of_the_settings(
     experiment: Experiment, looks: Looks, exams: Exams
 ):
     examiner(experiment, exams, caution=1.5).best(ranked(experiment))
@@ -142,20 +142,20 @@ def test_the_draw_to_choose_on_counts_with_the_caution_of_the_settings(
 
 
 def examiner(experiment: Experiment, exams: Exams, **settings: float | str) -> Examiner:
-    """One of a run with other settings of the examination."""
+    """An `Examiner` with other examination settings."""
     examination = dataclasses.replace(experiment.config.examination, **settings)
     config = dataclasses.replace(experiment.config, examination=examination)
     return Examiner(dataclasses.replace(experiment, config=config), {}, lambda _: None, exams)
 
 
 def ranked(experiment: Experiment, generation: int = 9) -> EvolutionState:
-    """A population at its last generation, the first the best."""
+    """A population at its last generation, sorted by fitness."""
     return dataclasses.replace(
         experiment.init(), fitness=jnp.arange(6.0)[::-1], generation=jnp.int32(generation)
     )
 
 
-def test_a_promising_best_with_room_is_examined_and_ends_the_run(experiment, looks, exams):
+def test_a_promising_best_with_margin_is_certified_and_ends_the_run(experiment, looks, exams):
     examined = examiner(experiment, exams).early(state_with(experiment, 3))
     assert examined is not None
     assert looks.asked == ["glance", "rehearsal", "exam"]
@@ -166,14 +166,14 @@ def test_a_promising_best_with_room_is_examined_and_ends_the_run(experiment, loo
 @pytest.mark.parametrize(
     ("generation", "speed", "alive", "nominal_check", "rehearsal", "asked"),
     [
-        (4, 0.7, 1.0, 0.3, 0.3, 0),  # not the generation to look
-        (3, 0.55, 1.0, 0.3, 0.3, 0),  # hardly faster than it must be
+        (4, 0.7, 1.0, 0.3, 0.3, 0),  # no validation is due
+        (3, 0.55, 1.0, 0.3, 0.3, 0),  # hardly faster than required
         (3, 0.7, 0.9, 0.3, 0.3, 0),  # falls on one of its starts
-        (3, 0.7, 1.0, 0.1, 0.3, 1),  # fails, or nearly, when nobody disturbs it
-        (3, 0.7, 1.0, 0.3, 0.1, 2),  # stays up, but with too little room
+        (3, 0.7, 1.0, 0.1, 0.3, 1),  # fails, or nearly, without disturbance
+        (3, 0.7, 1.0, 0.3, 0.1, 2),  # stays up, but with too little margin
     ],
 )
-def test_else_it_goes_on_and_spares_what_it_can(
+def test_otherwise_the_run_continues_without_further_checks(
     experiment, looks, exams, generation, speed, alive, nominal_check, rehearsal, asked
 ):
     looks.glances, looks.rehearsals = [nominal_check], [rehearsal]
@@ -183,7 +183,7 @@ def test_else_it_goes_on_and_spares_what_it_can(
     assert exams.taken(9) == 0
 
 
-def test_who_did_not_do_is_not_looked_at_again(experiment, looks, exams):
+def test_a_failed_candidate_is_not_validated_again(experiment, looks, exams):
     looks.rehearsals = [0.1]
     same = examiner(experiment, exams)
     for _ in range(2):
@@ -191,7 +191,7 @@ def test_who_did_not_do_is_not_looked_at_again(experiment, looks, exams):
     assert looks.asked == ["glance", "rehearsal"]
 
 
-def test_in_the_second_half_any_margin_is_worth_an_examination(experiment, looks, exams):
+def test_in_the_second_half_any_positive_margin_leads_to_an_attempt(experiment, looks, exams):
     looks.rehearsals = [0.1]
     same = examiner(experiment, exams)
     assert same.early(state_with(experiment, 3)) is None
@@ -201,17 +201,15 @@ def test_in_the_second_half_any_margin_is_worth_an_examination(experiment, looks
     assert examiner(experiment, exams).early(state_with(experiment, 6)) is None
 
 
-def test_any_pass_ends_a_run_that_was_worth_an_examination(experiment, looks, exams):
+def test_any_certificate_that_passes_ends_the_run(experiment, looks, exams):
     looks.certificates = [0.01]
     assert examiner(experiment, exams).early(state_with(experiment, 3)) is not None
 
 
-def test_who_fails_the_examination_is_not_examined_again_and_the_next_is_the_second_try(
-    experiment, looks, exams
-):
+def test_a_failed_champion_is_not_retried_and_the_next_is_attempt_two(experiment, looks, exams):
     looks.certificates = [-0.1, 0.3]
     assert examiner(experiment, exams).early(state_with(experiment, 3)) is None
-    # A run that is resumed knows it from the file.
+    # A resumed run reads the failure from the file.
     assert examiner(experiment, exams).early(state_with(experiment, 6)) is None
     assert looks.asked.count("exam") == 1
     other = other_best(state_with(experiment, 6))
@@ -220,7 +218,7 @@ def test_who_fails_the_examination_is_not_examined_again_and_the_next_is_the_sec
     assert examined.certificate.attempts == 2
 
 
-def test_the_second_is_looked_at_where_the_first_was_only_lucky(experiment, looks, exams):
+def test_the_second_candidate_is_validated_where_the_first_fails(experiment, looks, exams):
     state = state_with(experiment, 3)
     both = dataclasses.replace(
         state,
@@ -235,13 +233,13 @@ def test_the_second_is_looked_at_where_the_first_was_only_lucky(experiment, look
     assert examined.champion.fitness == -1.0
 
 
-def test_who_did_the_same_is_no_other_candidate(experiment):
+def test_individuals_with_equal_fitness_are_one_candidate(experiment):
     alike = dataclasses.replace(ranked(experiment), fitness=jnp.float32([3, 3, 2, 2, 2, 1]))
     assert experiment.candidates(alike) == [0, 2, 5]
 
 
 class RequestedTrials:
-    """What the second level will say, and how hastily it was asked."""
+    """Scripted results of the second level, and whether each call was hasty."""
 
     def __init__(self, *shares: float) -> None:
         self.shares, self.hasty = list(shares), list[bool]()
@@ -252,10 +250,10 @@ class RequestedTrials:
         return Stress("", (Trial("friction 0.4", share, share >= 0.9),), StressConfig())
 
 
-def test_who_is_to_walk_anywhere_goes_on_until_it_does(
+def test_level_anywhere_ends_the_run_only_if_the_stress_test_passes(
     experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
 ):
-    """The certificate alone ends no run then; who fails it is not asked for more."""
+    """The certificate alone ends no run; if it fails, no stress test follows."""
     asked = RequestedTrials(0.5, 0.95)
     monkeypatch.setattr(examination, "stress", asked)
     anywhere = {"level": "anywhere", "attempts": 4}
@@ -270,7 +268,7 @@ def test_who_is_to_walk_anywhere_goes_on_until_it_does(
     assert asked.hasty == [True, True]
 
 
-def test_in_the_end_all_of_the_second_level_is_asked(
+def test_at_the_end_the_whole_second_level_is_tested(
     experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
 ):
     asked = RequestedTrials(0.5)
@@ -282,12 +280,12 @@ def test_in_the_end_all_of_the_second_level_is_asked(
 
 
 def other_best(state: EvolutionState) -> EvolutionState:
-    """The same with another genome in front."""
+    """The state with another best genome."""
     genomes = jax.tree.map(lambda leaf: leaf.at[0].set(leaf[1]), state.genomes)
     return dataclasses.replace(state, genomes=genomes)
 
 
-def test_the_last_examination_is_kept_for_the_end(experiment, looks, exams):
+def test_the_last_attempt_is_kept_for_the_end(experiment, looks, exams):
     looks.certificates = [-0.1]
     state = state_with(experiment, 3)
     two = examiner(experiment, exams, attempts=2)
@@ -297,7 +295,7 @@ def test_the_last_examination_is_kept_for_the_end(experiment, looks, exams):
     assert two.best(ranked(experiment)).certificate.attempts == 2
 
 
-def test_in_the_end_the_first_with_room_is_examined_and_nobody_else(experiment, looks, exams):
+def test_at_the_end_only_the_first_with_enough_margin_is_certified(experiment, looks, exams):
     settings = {"candidates": 3, "difference": 0.0}
     looks.rehearsals = [0.1, 0.25, 0.9]
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
@@ -319,10 +317,10 @@ LOOK = ["glance", "rehearsal"]
         (3, [-0.5, -0.5, 0.3], [*LOOK * 2, "exam", *LOOK, "exam", "exam"], 5.0),
     ],
 )
-def test_in_the_end_a_run_uses_the_examinations_that_it_has(
+def test_at_the_end_a_run_uses_its_remaining_attempts(
     experiment, looks, exams, attempts, certificates, asked, fitness
 ):
-    """The second candidate and the third have room, the first has a little."""
+    """The second and third candidates have enough margin, the first has a little."""
     settings = {"candidates": 3, "difference": 0.0, "attempts": attempts}
     looks.rehearsals, looks.certificates = [0.1, 0.25, 0.9], certificates
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
@@ -331,8 +329,8 @@ def test_in_the_end_a_run_uses_the_examinations_that_it_has(
     assert exams.taken(9) == looks.asked.count("exam") <= attempts
 
 
-def test_in_the_end_nobody_is_tried_again_who_would_fail(experiment, looks, exams):
-    """One without any room is examined only so that a run has a verdict."""
+def test_at_the_end_no_further_candidate_that_would_fail_is_certified(experiment, looks, exams):
+    """A candidate without margin is certified only so that the run has a result."""
     settings = {"candidates": 3, "difference": 0.0}
     looks.rehearsals, looks.certificates = [-0.3, -0.1, -0.2], [-0.5]
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
@@ -340,19 +338,19 @@ def test_in_the_end_nobody_is_tried_again_who_would_fail(experiment, looks, exam
     assert examined.champion.fitness == 4.0
 
 
-def test_in_the_end_the_best_margin_is_examined_where_nobody_has_room(experiment, looks, exams):
+def test_at_the_end_the_best_margin_is_certified_where_none_is_enough(experiment, looks, exams):
     settings = {"candidates": 3, "difference": 0.0}
     looks.glances, looks.rehearsals = [-0.3, 0.3, 0.3], [0.05, 0.15]
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
     assert examined.champion.fitness == 3.0
-    # Who fails undisturbed is not disturbed.
+    # No disturbed trials after a failed nominal check.
     assert looks.asked == ["glance", *["glance", "rehearsal"] * 2, "exam"]
-    # Nor is one disturbed further than it can pass, or be better than the best so far.
+    # A trial run ends once it can neither pass nor exceed the best so far.
     assert looks.wanted == pytest.approx([-0.3, 0.0])
 
 
-def test_on_the_way_those_are_looked_at_that_do_best_in_the_tryout(experiment, looks, exams):
-    """Whatever their fitness; nobody with less than the margin that is wanted."""
+def test_during_the_run_the_best_in_prescreening_are_validated(experiment, looks, exams):
+    """Fitness does not matter; candidates below the wanted margin are skipped."""
     state = state_with(experiment, 6)
     all_alike = dataclasses.replace(
         state,
@@ -375,7 +373,7 @@ def test_on_the_way_those_are_looked_at_that_do_best_in_the_tryout(experiment, l
     assert examined.champion.fitness == 2.0
 
 
-def test_in_the_end_who_fails_the_tryout_is_looked_at_only_if_all_do(experiment, looks, exams):
+def test_at_the_end_prescreening_failures_are_validated_only_if_all_fail(experiment, looks, exams):
     settings = {"candidates": 3, "difference": 0.0}
     looks.rehearsals = [0.1]
     some = dataclasses.replace(
@@ -391,31 +389,31 @@ def test_in_the_end_who_fails_the_tryout_is_looked_at_only_if_all_do(experiment,
     assert looks.asked == [*LOOK, "exam"]
 
 
-def test_in_the_end_one_that_has_failed_before_is_not_chosen(experiment, looks, exams):
+def test_at_the_end_a_candidate_that_has_failed_before_is_not_chosen(experiment, looks, exams):
     settings = {"candidates": 2, "difference": 0.0, "attempts": 1}
     looks.certificates = [-0.1]
-    # The same two in three generations.
+    # The same two candidates in three generations.
     chosen = [
         examiner(experiment, exams, **settings).best(ranked(experiment, generation))
         for generation in (7, 8, 9)
     ]
     assert [c.champion.fitness for c in chosen] == [5.0, 4.0, 5.0]
-    # Nobody was left in the last: the failure stands, and is no further try.
+    # No candidate was left in the last: the failure stands, and is no further attempt.
     assert [c.certificate.attempts for c in chosen] == [1, 2, 1]
     assert exams.taken(9) == 2
-    # Once more is the same once more.
+    # A repetition gives the same result.
     assert examiner(experiment, exams, **settings).best(ranked(experiment, 8)).champion.fitness == 4
 
 
 @pytest.fixture
 def promising(monkeypatch: pytest.MonkeyPatch, looks: Looks) -> None:
-    """Everybody is promising, so that the small run is looked at."""
+    """All individuals are promising, so that the small run is validated."""
     monkeypatch.setattr(examination, "_promising", lambda *_: True)
 
 
 @pytest.fixture(scope="module", autouse=True)
 def made_up_verdicts() -> Iterator[None]:
-    """Runs evolve, but simulate as little as what looks at them."""
+    """Runs evolve but simulate nothing, like their validation."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stages, "evaluate", made_up_evaluate)
         yield
@@ -447,7 +445,7 @@ def test_a_certified_run_ends_early_and_stays_ended(
 
 
 def files_of(folder: Path) -> dict[str, str]:
-    """What a run has found; how fast it was is not among it."""
+    """The results of a run, without its timings."""
     names = ("champion.json", CERTIFICATE, EXAMS)
     found = {name: (folder / name).read_text() for name in names}
     clock = ("steps_per_second", "wall_s")
@@ -456,14 +454,14 @@ def files_of(folder: Path) -> dict[str, str]:
     return found | {"log": json.dumps(told), "checkpoints": str(stored_generations(folder))}
 
 
-def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
+def test_generations_evolved_during_a_passing_validation_are_dropped(
     tmp_path: Path,
     experiment: Experiment,
     promising: None,
     looks: Looks,
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """Whatever the machine does first, the folder is the one of a run that waited."""
+    """Whatever ends first, the folder equals that of a run that waited."""
     waited, beside = tmp_path / "waited", tmp_path / "beside"
     seen: list[int] = []
     soon = examination.nominal_check
@@ -472,7 +470,7 @@ def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
         until = time.monotonic() + 60
         while not seen and time.monotonic() < until:
             lines = read_metrics(beside / "metrics.jsonl")
-            # By then a checkpoint is due, which must wait.
+            # By then a checkpoint is due; it must wait.
             seen.extend(line["generation"] for line in lines if line["generation"] > 4)
             time.sleep(0.01)
         return soon(*arguments)
@@ -496,10 +494,10 @@ def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
     assert files_of(beside) == files_of(waited)
 
 
-def test_hardly_anything_evolves_beside_an_examination(
+def test_at_most_one_generation_evolves_during_certification(
     tmp_path: Path, experiment: Experiment, promising: None, monkeypatch: pytest.MonkeyPatch
 ):
-    """It takes all cores; only the generation that has begun is ended."""
+    """Certification takes all cores; only the generation that has begun is finished."""
     folder, lru, soon = tmp_path / "run", [], examination.certify
 
     def slow(*arguments: object, **settings: object) -> Certificate:
@@ -514,7 +512,7 @@ def test_hardly_anything_evolves_beside_an_examination(
     assert lru[1] - lru[0] <= 1
 
 
-def test_what_goes_wrong_in_a_look_ends_the_run_as_it_would_have(
+def test_an_error_in_validation_ends_the_run(
     tmp_path: Path, experiment: Experiment, promising: None, monkeypatch: pytest.MonkeyPatch
 ):
     def full(*_: object, **__: object) -> Certificate:
@@ -526,7 +524,7 @@ def test_what_goes_wrong_in_a_look_ends_the_run_as_it_would_have(
         trained(tmp_path / "run", experiment)
 
 
-def test_one_that_never_passes_goes_on_to_the_end(
+def test_a_run_that_never_passes_goes_on_to_the_end(
     tmp_path: Path, experiment: Experiment, promising: None, looks: Looks
 ):
     looks.certificates = [-0.5]
@@ -539,7 +537,7 @@ def test_one_that_never_passes_goes_on_to_the_end(
     assert f"This was examination {tries} of its run" in said
     written = (folder / CERTIFICATE).read_text(), (folder / EXAMS).read_text()
     assert json.loads(written[0])["attempts"] == tries
-    # Resumed from an earlier checkpoint it does the same again, and that is no further try.
+    # Resumed from an earlier checkpoint, it repeats its attempts; they count once.
     shutil.rmtree(folder / "checkpoints" / "9")
     trained(folder, experiment, resume=True)
     assert written == ((folder / CERTIFICATE).read_text(), (folder / EXAMS).read_text())

@@ -1,4 +1,4 @@
-"""The book of a run's examinations."""
+"""The log of a run's examination attempts."""
 
 from pathlib import Path
 
@@ -19,29 +19,29 @@ def test_attempts_are_counted_in_the_order_of_generations(exams):
     assert exams.attempt("first", 10) == 1
     assert exams.attempt("second", 20) == 2
     assert exams.attempt("new", 25) == 3
-    # One of a checkpoint before the second: what came later in the file had not happened yet.
+    # From a checkpoint before the second attempt: later lines do not count yet.
     assert exams.attempt("new", 15) == 2
     assert [exams.taken(g) for g in (5, 10, 20, 99)] == [0, 1, 2, 2]
 
 
-def test_the_same_champion_again_is_no_further_try(exams):
+def test_the_same_champion_again_is_no_further_attempt(exams):
     exams.add("first", 10, passed=False)
     assert exams.taken(99) == 2
 
 
-def test_who_failed_is_known_and_nobody_else(exams):
+def test_only_failed_champions_are_known_as_failed(exams):
     assert [exams.failed(name, 30) for name in ("first", "second", "new")] == [True, False, False]
 
 
-def test_a_run_that_goes_back_does_not_know_what_comes(exams):
+def test_a_run_that_goes_back_ignores_later_attempts(exams):
     assert [exams.failed("first", g) for g in (9, 10)] == [False, True]
 
 
-def test_a_run_without_the_file_has_taken_none(tmp_path):
+def test_a_run_without_the_file_has_no_attempts(tmp_path):
     assert Exams(tmp_path / "none.jsonl").attempt("new", 3) == 1
 
 
-def test_a_line_cut_off_by_a_kill_is_written_anew(exams):
+def test_a_line_cut_off_by_a_kill_is_rewritten(exams):
     text = exams.path.read_text()
     exams.path.write_text(text[:-20])
     assert exams.taken(99) == 1

@@ -1,4 +1,4 @@
-"""Rows of one program that have the best of each other judged among their own children."""
+"""Migrants between rows of one program: a row evaluates the best of others among its children."""
 
 import dataclasses
 from functools import partial
@@ -20,7 +20,7 @@ ROWS, POPULATION, CHILDREN = 3, 6, 5
 
 
 def states(age: int) -> EvolutionState:
-    """Genomes that tell who is who: 100 per row, 1 per rank."""
+    """Genomes that identify their individual: 100 per row, 1 per rank."""
     who = 100.0 * jnp.arange(ROWS)[:, None] + jnp.arange(POPULATION)
     blank = {field.name: jnp.zeros(ROWS) for field in dataclasses.fields(EvolutionState)}
     told = {
@@ -41,7 +41,7 @@ def children(sources: list[list[int]], age: int) -> Proposal:
     return with_guests(jnp.int32(sources), states(age), nobody)
 
 
-def test_one_of_the_best_of_each_source_takes_the_place_of_a_last_child():
+def test_a_migrant_from_each_source_replaces_a_last_child():
     found = children([[1, 2], [0, 2], [1, 0]], age=0)
     assert found.offspring["poses"][..., 0].tolist() == [
         [-1, -1, -1, 100, 200],
@@ -53,7 +53,7 @@ def test_one_of_the_best_of_each_source_takes_the_place_of_a_last_child():
     assert (found.born == 1).all()
 
 
-def test_the_best_come_in_turn():
+def test_the_best_migrate_in_turn():
     who = [
         float(children([[1], [0], [0]], age).offspring["poses"][0, -1, 0])
         for age in range(SENT + 1)
@@ -61,19 +61,19 @@ def test_the_best_come_in_turn():
     assert who == [*(100.0 + rank for rank in range(SENT)), 100.0]
 
 
-def test_a_rows_own_number_stands_for_nobody():
+def test_a_rows_own_index_means_no_migrant():
     found = children([[1], [1], [0]], age=2).offspring["poses"][..., -1, 0]
     assert found.tolist() == [102, -1, 2]
 
 
-def test_nobody_comes_who_has_not_been_judged():
+def test_no_migration_before_the_first_evaluation():
     assert (children([[1], [0], [0]], age=-1).offspring["poses"] == -1).all()
 
 
-def test_guests_are_seated_among_what_a_program_proposes(
+def test_migrants_enter_the_proposals_of_rows_with_sources(
     stool: Creature, small_configs: list[Config], monkeypatch: pytest.MonkeyPatch
 ):
-    """Traced, which tells it without a minute of compiling; rows on their own have no such place."""
+    """Traced only, which spares a minute of compilation. Rows without sources have no migrants."""
     seated = []
 
     def noted(sources: jax.Array, states: EvolutionState, proposals: Proposal) -> Proposal:
@@ -88,7 +88,7 @@ def test_guests_are_seated_among_what_a_program_proposes(
     assert seated == [((3, 2), (3, 6))]
 
 
-def test_rows_with_fewer_sources_are_filled_up_with_their_own_number(stool, small_configs):
+def test_missing_sources_are_padded_with_the_rows_own_index(stool, small_configs):
     batch = build_batch(stool, small_configs, sources=[[1], [0, 2], [1]])
     np.testing.assert_array_equal(batch.rows.sources, [[1, 0], [0, 2], [1, 2]])
     assert build_batch(stool, small_configs).rows.sources is None

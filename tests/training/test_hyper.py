@@ -1,4 +1,4 @@
-"""The config as the compiled program reads it, and runs side by side in one program."""
+"""The config as the compiled program reads it, and several runs in one program."""
 
 import dataclasses
 import re
@@ -74,11 +74,11 @@ def test_numbers_and_switches_do_not_shape_the_program(tables: dict):
         "growing pool",
     ],
 )
-def test_sizes_and_what_is_built_in_shape_the_program(tables: dict):
+def test_sizes_and_built_in_settings_shape_the_program(tables: dict):
     assert shape(**tables) != shape()
 
 
-def test_a_choice_is_known_plain_and_traced():
+def test_a_choice_can_be_read_plain_and_traced():
     config = dataclasses.replace(Config(), evolution=EvolutionConfig(mutation="bit"))
     for kind in (config.evolution.mutation, traced(config).evolution.mutation):
         assert bool(chosen(kind, "bit"))
@@ -102,14 +102,14 @@ OTHERWISE = {
     "fitness": {"weights": {"slip": 3.0}},
     "rollout": {"push": 0.0},
 }
-"""These at once, a weight and a push that others do not have."""
+"""The changes of the variants at once, with another weight and no push."""
 
 
 def variant(tables: dict, physics: str = "mjx") -> Config:
-    """A config with the lanes of one that runs alone, so that rounding is the same, and of which half
-    are tried in one start only.
+    """A config with the lanes of a run alone, so that rounding is equal; half of the individuals
+    run one start only.
 
-    On the fast step it is not: there it depends on the lane.
+    In lane-major physics rounding depends on the lane.
     """
     tables = dict(tables)
     seed = tables.pop("seed", 0)
@@ -119,7 +119,7 @@ def variant(tables: dict, physics: str = "mjx") -> Config:
 
 @pytest.fixture(scope="module")
 def balls(tmp_path_factory: pytest.TempPathFactory) -> Creature:
-    """The stool with one leg in its middle, a foot of it and a ball for its plate.
+    """The stool with a ball for its plate and a single central leg that is only a foot.
 
     Its programs are short, and its plain MJX compiles sooner as users get it.
     """
@@ -137,7 +137,7 @@ def balls(tmp_path_factory: pytest.TempPathFactory) -> Creature:
 
 
 def test_one_program_serves_every_value(balls: Creature):
-    """Another seed, weight or mutation is found in the compilation cache: the program's text is the same."""
+    """Other seeds, weights and mutations hit the compilation cache: the text is the same."""
     texts = [
         program_text(build_batch(balls, [variant(tables, physics="auto")]))
         for tables in ({}, OTHERWISE)
@@ -152,7 +152,7 @@ SIMULATED = pytest.mark.thorough(
 
 @pytest.fixture(scope="module", params=["made up", pytest.param("simulated", marks=SIMULATED)])
 def batch(request: pytest.FixtureRequest, balls: Creature) -> Iterator[Batch]:
-    """Runs of which only evolution is compiled, and whole ones, as users get them."""
+    """Runs that compile only evolution, and whole runs, as users get them."""
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "simulated":
             request.getfixturevalue("emitted_as_shipped")
@@ -166,11 +166,11 @@ def step(batch: Batch) -> Step:
     return batch.compile()
 
 
-def test_a_row_equals_the_run_that_runs_alone_to_the_bit(balls: Creature, batch: Batch, step: Step):
+def test_a_row_equals_its_run_alone_bit_for_bit(balls: Creature, batch: Batch, step: Step):
     states = batch.place(batch.init())
     for _ in range(3):
         states, metrics = step(states)
-    # One program serves every value, so it is compiled once; the numbers of the body are in it.
+    # One program serves every value, so it is compiled once; the body's numbers are in it.
     compiled = build_batch(balls, [variant({})]).stages()
     for row, tables in enumerate(VARIANTS.values()):
         one = build_batch(balls, [variant(tables)])
@@ -204,7 +204,7 @@ def test_settings_of_different_shapes_are_refused(stool: Creature):
 
 
 @pytest.mark.parametrize("use", [bool, lambda x: x + 1, lambda x: x < 1, jnp.asarray, float])
-def test_a_setting_of_the_host_is_not_there_for_the_program(use: Callable[[object], object]):
+def test_host_settings_are_not_available_to_the_program(use: Callable[[object], object]):
     program = traced(small_config(evolution={"generations": 9}))
     for setting in (program.evolution.generations, program.seed, program.examination.every):
         with pytest.raises(TypeError):

@@ -1,4 +1,4 @@
-"""A body whose numbers are inputs of the program: the next of its make-up needs no compilation."""
+"""Body numbers as program inputs: another body of the same structure needs no compilation."""
 
 import re
 import shutil
@@ -21,7 +21,7 @@ INPUTS = {"body": "inputs", "physics": "auto"}
 
 
 def changed(folder: Path, pattern: str, factor: float) -> Creature:
-    """The stool, or the body in the folder, with the first number of every match of a pattern times a factor."""
+    """The folder's body, by default the stool, with the number in each match scaled."""
     if not folder.exists():
         shutil.copytree(STOOL, folder)
     for name in ("creature.xml", "creature.toml"):
@@ -35,7 +35,7 @@ SADDLE = """<geom name="saddle" type="box" size="0.05 0.04 0.01" pos="0 0 0.08" 
 
 
 def saddled(folder: Path) -> Creature:
-    """The body in a folder with a shape more, which comes near other parts."""
+    """The folder's body with one more shape, which comes near other parts."""
     text = (folder / "creature.xml").read_text()
     trunk = re.search(r'<body name="trunk"[^>]*>', text)
     assert trunk
@@ -67,8 +67,8 @@ def test_another_body_has_the_same_program(stools: str, change: str, tmp_path: P
 
 
 def test_a_shape_more_needs_no_program_of_its_own(stools: str, stool: Creature, tmp_path: Path):
-    """There is room for shapes that may touch the floor and for pairs that may overlap; and the
-    numbers of a body are inputs.
+    """The program is padded for shapes that may touch the floor and pairs that may overlap, and
+    body numbers are inputs.
     """
     for change in OTHERS.values():
         changed(tmp_path / "other", *change)
@@ -77,7 +77,7 @@ def test_a_shape_more_needs_no_program_of_its_own(stools: str, stool: Creature, 
     assert program(other, **INPUTS) == stools
 
 
-def test_room_that_nothing_is_in_changes_nothing(tmp_path: Path):
+def test_padding_does_not_change_results(tmp_path: Path):
     creature = saddled(shutil.copytree(STOOL, tmp_path / "other"))
     known = (creature.evolution_model, observation_layout(creature), find_crossings(creature))
     tight, roomy = fast_plant(*known), fast_plant(*known, roomy=True)
@@ -90,7 +90,7 @@ def test_room_that_nothing_is_in_changes_nothing(tmp_path: Path):
     depths = [np.asarray(jax.jit(plant.overlap)(state)) for plant in (tight, roomy)]
     np.testing.assert_allclose(depths[0], depths[1], atol=1e-6)
     assert np.ptp(depths[0]) > 1e-3
-    # Nothing else of a step is compiled.
+    # Only this part of a step is compiled.
     lowest = [jax.jit(lambda at, p=plant: p.forward(at)[0].geom_low) for plant in (tight, roomy)]
     seen = [np.asarray(one(state)) for one in lowest]
     feet = len(creature.feet.foot_of)
@@ -99,13 +99,13 @@ def test_room_that_nothing_is_in_changes_nothing(tmp_path: Path):
 
 
 @pytest.mark.thorough("tests/physics/test_bodies.py has it of one step")
-def test_as_constants_it_has_one_of_its_own(stool, tmp_path: Path):
+def test_a_body_as_constants_has_its_own_program(stool, tmp_path: Path):
     other = changed(tmp_path / "other", *OTHERS["stiffer"])
     assert program(other, physics="mjx") != program(stool, physics="mjx")
 
 
 @pytest.mark.thorough("tests/physics/test_bodies.py compares steps of bodies as inputs")
-def test_the_motion_is_that_of_the_bodys_own_program(stool: Creature, tmp_path: Path):
+def test_a_body_as_inputs_moves_as_in_its_own_program(stool: Creature, tmp_path: Path):
     """The stool's program with another body's numbers, against one made for that body."""
     other = changed(tmp_path / "other", *OTHERS["thicker, so heavier"])
     given, own = (

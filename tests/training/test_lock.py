@@ -1,4 +1,4 @@
-"""One process at a time writes a run folder, and the others know which one."""
+"""One process at a time writes a run folder; the others can name it."""
 
 import json
 import os
@@ -47,7 +47,7 @@ def another(folder: Path) -> Iterator[subprocess.Popen]:
             process.kill()
 
 
-def test_another_process_is_refused_and_told_by_whom(tmp_path: Path):
+def test_another_process_is_refused_with_the_name_of_the_first(tmp_path: Path):
     with another(tmp_path) as process:
         who = f"process {process.pid} on {socket.gethostname()}"
         assert running(tmp_path) == who
@@ -58,7 +58,7 @@ def test_another_process_is_refused_and_told_by_whom(tmp_path: Path):
     assert not list(tmp_path.iterdir())
 
 
-def test_what_a_killed_process_leaves_locks_nothing(tmp_path: Path):
+def test_a_killed_process_holds_no_lock(tmp_path: Path):
     with another(tmp_path) as process:
         process.send_signal(signal.SIGKILL)
         process.wait()
@@ -69,8 +69,8 @@ def test_what_a_killed_process_leaves_locks_nothing(tmp_path: Path):
     assert not (tmp_path / LOCK).exists()
 
 
-def test_a_look_does_not_keep_a_process_from_beginning(tmp_path: Path, monkeypatch):
-    """One that looks holds the lock for a moment."""
+def test_reading_the_lock_does_not_block_a_start(tmp_path: Path, monkeypatch):
+    """A reader holds the lock for a moment."""
     (tmp_path / LOCK).touch()
     looks = (tmp_path / LOCK).open("rb")
     assert stored._try(looks, shared=True)
@@ -79,10 +79,8 @@ def test_a_look_does_not_keep_a_process_from_beginning(tmp_path: Path, monkeypat
         assert running(tmp_path) == ME
 
 
-def test_a_lock_that_was_just_taken_away_is_not_mistaken_for_the_new_one(
-    tmp_path: Path, monkeypatch
-):
-    """Two would have the folder: one the old file, one the new."""
+def test_a_just_removed_lock_is_not_mistaken_for_the_new_one(tmp_path: Path, monkeypatch):
+    """Else two processes would hold the folder: one by the old file, one by the new."""
     attempt, files = stored._try, []
 
     def late(file, shared=False):
@@ -107,7 +105,7 @@ def test_runs_of_a_folder_are_locked_together(tmp_path: Path):
     assert running(tmp_path / "seed0") is None
 
 
-def test_a_file_that_says_nothing_still_locks(tmp_path: Path):
+def test_a_lock_file_without_content_still_locks(tmp_path: Path):
     with locked(tmp_path):
         (tmp_path / LOCK).write_text("[]")
         assert running(tmp_path) == "another process"
@@ -145,7 +143,7 @@ def test_a_second_resume_is_refused_with_the_name_of_the_first(
     assert not (run / LOCK).exists()
 
 
-def test_a_new_run_is_locked_as_long_as_it_evolves(tmp_path: Path, capsys, monkeypatch):
+def test_a_new_run_is_locked_while_it_evolves(tmp_path: Path, capsys, monkeypatch):
     run, seen = tmp_path / "run", []
 
     def train(folder, *given):

@@ -1,4 +1,4 @@
-"""A run whose bodies grow is made of the same parts as every other."""
+"""Runs of modular bodies are made of the same parts as all others."""
 
 import dataclasses
 from pathlib import Path
@@ -25,7 +25,7 @@ from mjxgait.training.spec import make_spec
 
 
 class Smelling(Brains):
-    """A brain with a mistake."""
+    """A brain that reads an unknown observation."""
 
     def __init__(self, *told: Any) -> None:
         super().__init__(*told)
@@ -37,7 +37,7 @@ def simulator(controller: str, task: str = "swim") -> Simulator:
     return make_spec(load_creature("blocks"), build_config({"use": use}, "test")).simulator()
 
 
-def test_a_brain_reads_only_what_there_is_to_sense():
+def test_a_brain_reads_only_available_observations():
     register(dataclasses.replace(controller_kind("brain"), name="smelling", controller=Smelling))
     assert simulator("brain").controller.reads == ("joint_pos", "contact")
     assert simulator("brain", "follow").controller.reads == ("joint_pos", "contact", "light")
@@ -45,12 +45,12 @@ def test_a_brain_reads_only_what_there_is_to_sense():
         simulator("smelling")
 
 
-def test_who_swims_has_water_and_neither_ground_nor_weight():
+def test_swimming_has_water_but_no_ground_or_gravity():
     plant: Any = simulator("brain").plant
     assert plant.around == Surroundings(step=0.01, floor=False, gravity=0.0, drag=DRAG)
 
 
-def test_who_walks_has_ground_and_weight():
+def test_roaming_has_ground_and_gravity():
     plant: Any = simulator("brain", "roam").plant
     assert plant.around == Surroundings(
         step=0.01, contact=0.02, floor=True, gravity=GRAVITY, drag=0.0
@@ -58,7 +58,7 @@ def test_who_walks_has_ground_and_weight():
 
 
 def test_a_shorter_step_makes_harder_ground():
-    """Half the step, and a touch that is over in half the time."""
+    """Half the step also halves the contact time."""
     seed = at_step(load_creature("blocks"), 0.005)
     use = {"controller": "brain", "task": "jump"}
     config = build_config({"use": use, "rollout": {"step": 0.005}}, "test")
@@ -85,8 +85,8 @@ def test_a_run_has_the_step_of_its_task(task: str, step: float, monkeypatch: pyt
     assert seen == [step, step]
 
 
-def test_bodies_that_grow_walk_by_another_task_of_that_name():
-    """A user asks for a walk; the environment knows which."""
+def test_walk_means_roam_for_modular_bodies():
+    """The environment decides which task `walk` stands for."""
     for env, task in (("blocks", "roam"), ("tall_quadruped", "walk")):
         creature = load_creature(env)
         asked = resolve_config(creature.settings.train, env, use={"task": "walk"})
@@ -96,8 +96,8 @@ def test_bodies_that_grow_walk_by_another_task_of_that_name():
     assert (written.use.task, type(written.fitness)) == ("roam", RoamConfig)
 
 
-def test_sims_population_is_his():
-    """300, of which a fifth survives; four in ten children have one parent."""
+def test_the_sims_settings_have_his_population():
+    """300 individuals, of which a fifth survive; four in ten children have one parent."""
     creature = load_creature("blocks")
     config = resolve_config(creature.settings.train, "blocks", Path("sims"), {"task": "walk"})
     evolution, controller = config.evolution, config.controller
@@ -108,7 +108,7 @@ def test_sims_population_is_his():
     assert (controller.crossover, controller.grafting) == (0.3, 0.3)
 
 
-def test_a_creature_says_things_to_one_task_only():
+def test_creature_settings_can_be_for_one_task_only():
     creature = load_creature("blocks")
     starts = [
         resolve_config(creature.settings.train, "blocks", use={"task": task}).rollout.starts
@@ -157,7 +157,7 @@ def test_a_creature_says_things_to_one_task_only():
         ),
     ],
 )
-def test_who_does_not_fit_is_refused_in_one_sentence(
+def test_incompatible_settings_are_refused_in_one_sentence(
     env: str, given: dict[str, Any], said: str, tmp_path: Path
 ):
     creature, config = load_creature(env), build_config(given, "test")

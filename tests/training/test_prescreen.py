@@ -1,4 +1,6 @@
-"""Who is looked at first: those that do best on many starts in evolution's own physics."""
+"""Pre-screening: candidates are validated in the order of their success on many starts in
+evolution's physics.
+"""
 
 import dataclasses
 from pathlib import Path
@@ -36,7 +38,7 @@ def experiment() -> Experiment:
 
 @pytest.fixture
 def brief(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tryouts are as short as a test can bear."""
+    """Short episodes for pre-screening."""
 
     def shorter(config: Config) -> Config:
         long = tried_settings(config)
@@ -45,7 +47,7 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prescreen, "tried_settings", shorter)
 
 
-def test_starts_are_as_far_disturbed_and_as_long_as_the_examiners():
+def test_episodes_have_the_length_and_disturbances_of_the_examination():
     config, exam = tried({"rollout": {"variety": 1, "joint_noise": 0.3}}), CertificateConfig()
     settings = tried_settings(config)
     assert settings.rollout.starts == 1 + STARTS
@@ -58,24 +60,24 @@ def test_starts_are_as_far_disturbed_and_as_long_as_the_examiners():
     assert same == config
 
 
-def test_starts_are_others_than_those_of_the_generations(experiment: Experiment, brief: None):
-    """Even where both are disturbed alike: a prefix of the same draw would be no draw of its own."""
+def test_starts_differ_from_those_of_the_generations(experiment: Experiment, brief: None):
+    """Even with equal disturbances: a prefix of the same draw would not be independent."""
     ours, others = experiment.starts, Prescreen(experiment)._starts
     assert not np.isin(np.asarray(others.friction)[0, 1:], np.asarray(ours.friction)).any()
 
 
-def test_trials_are_as_hard_as_they_become():
-    """The bar of limbo is where it belongs, however high it hangs in the run's first generations."""
+def test_trials_have_their_final_difficulty():
+    """The limbo bar has its final height, although it hangs higher in the first generations."""
     luxo = load_creature(find_creature("luxo"))
     resolved = resolve_config(luxo.settings.train, "luxo", None, {"task": "limbo"})
     limbo = build_experiment(luxo, dataclasses.replace(resolved, examination=tried().examination))
     assert np.asarray(Prescreen(limbo)._starts.goal.raised).tolist() == [[0.0] * (1 + STARTS)]
 
 
-def test_a_share_is_of_the_disturbed_starts_that_are_managed(
+def test_the_share_counts_the_disturbed_starts_that_succeed(
     experiment: Experiment, brief: None, monkeypatch: pytest.MonkeyPatch
 ):
-    """Individual by individual as simulated alone; the nominal start is not among them."""
+    """The result is that of each individual alone; the nominal start does not count."""
     trying, state = Prescreen(experiment), experiment.init()
     task = trying._trials.simulator.task
     ranks = [4, 0]
@@ -93,7 +95,7 @@ def test_a_share_is_of_the_disturbed_starts_that_are_managed(
     numbers, rows = trying._batch.known
 
     def alone(rank: int) -> np.ndarray:
-        """How far one gets in each disturbed start where all are that one."""
+        """Distance in each disturbed start, in a population of this individual only."""
         genomes = jax.tree.map(lambda leaf: leaf[None, jnp.full(MOST, rank)], state.genomes)
         outcome = program(numbers, rows.settings, trying._starts, genomes).outcome
         return np.asarray(outcome)[0, 0, 1:, task.outcomes.index("forward")]
@@ -106,7 +108,7 @@ def test_a_share_is_of_the_disturbed_starts_that_are_managed(
     ahead, compiled = Prescreen(experiment), list[Prescreen]()
 
     def once(self: Prescreen) -> jax.stages.Compiled:
-        """To compile once more would be the same."""
+        """Spare a second compilation of the same program."""
         compiled.append(self)
         return program
 
@@ -116,14 +118,14 @@ def test_a_share_is_of_the_disturbed_starts_that_are_managed(
     assert compiled == [ahead]
 
 
-def test_the_margin_is_that_of_the_criterion_which_the_starts_decide(experiment: Experiment):
+def test_the_margin_is_that_of_the_criterion_on_starts(experiment: Experiment):
     margin = Prescreen(experiment).margin
     assert margin(0.9) == pytest.approx(0.0)
     assert margin(0.95) == pytest.approx(0.5)
     assert margin(0.8) < 0
 
 
-def test_there_is_none_unless_it_is_asked_for(experiment: Experiment):
+def test_prescreening_is_off_unless_requested(experiment: Experiment):
     def of(**settings: int) -> Prescreen | None:
         examination = dataclasses.replace(experiment.config.examination, **settings)
         config = dataclasses.replace(experiment.config, examination=examination)
@@ -138,11 +140,11 @@ def test_there_is_none_unless_it_is_asked_for(experiment: Experiment):
     ("shares", "order"),
     [
         ((0.92, 0.95, 1.0), [2, 1, 0]),
-        ((0.92, 0.95, 0.92), [1, 0, 2]),  # of equals the fittest first
+        ((0.92, 0.95, 0.92), [1, 0, 2]),  # of equal shares the fittest first
         ((0.5, 0.95, 0.89), [1, 2, 0]),
     ],
 )
-def test_the_best_go_first_with_what_they_are_worth(
+def test_the_best_come_first_with_their_margins(
     experiment: Experiment, tmp_path: Path, shares: tuple, order: list
 ):
     exams = Exams(tmp_path / "exams.jsonl")

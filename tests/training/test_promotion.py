@@ -1,4 +1,4 @@
-"""Everybody is tried in the first start, and only the better ones in the others."""
+"""Promotion: all individuals run the first trial, and only the better ones the others."""
 
 import dataclasses
 from collections.abc import Callable
@@ -23,9 +23,7 @@ from mjxgait.training.generation import evolution_of, first_trials
 from mjxgait.types import Evaluation, RequestedTrials
 
 Trials = tuple[Experiment, EvolutionState, GenerationMetrics, Callable[[np.ndarray], Evaluation]]
-"""A run, its first generation, and the verdict on its first genomes in the wanted trials [N, R]
-alone.
-"""
+"""A run, its first generation, and evaluations of its first genomes in requested trials [N, R]."""
 
 
 @pytest.fixture(scope="module")
@@ -51,23 +49,23 @@ def half(stool: Creature) -> Trials:
 
 @pytest.fixture(scope="module")
 def everybody(half: Trials) -> Evaluation:
-    """The verdict on all in all trials, in the order of `genomes`."""
+    """The evaluation of all in all trials, in the order of `genomes`."""
     return half[-1](np.ones((6, 3), bool))
 
 
 def genomes(half: Trials) -> list[bytes]:
-    """Those of the first population."""
+    """The genomes of the first population."""
     return [poses.tobytes() for poses in np.asarray(half[0].init().genomes.key_poses)]
 
 
 def steps(half: Trials, evaluation: Evaluation) -> np.ndarray:
-    """How long each trial lasted, [N, R]."""
+    """The steps of each trial, [N, R]."""
     seconds = evaluation.outcome[..., half[0].simulator.task.outcomes.index("seconds")]
     return np.round(seconds / float(half[0].creature.model.opt.timestep)).astype(int)
 
 
 def by_genome(state: EvolutionState) -> dict[bytes, tuple[np.ndarray, float]]:
-    """Terms and fitness of everybody."""
+    """Terms and fitness of each genome."""
     return {
         poses.tobytes(): (terms, float(fitness))
         for poses, terms, fitness in zip(
@@ -76,9 +74,7 @@ def by_genome(state: EvolutionState) -> dict[bytes, tuple[np.ndarray, float]]:
     }
 
 
-def test_who_does_best_in_the_first_start_is_judged_as_if_all_were(
-    half: Trials, everybody: Evaluation
-):
+def test_promotion_gives_the_same_result_as_all_trials(half: Trials, everybody: Evaluation):
     experiment, state, _, _ = half
     rank = evolution_of(experiment.simulator, experiment.config).rank
     worth = np.asarray(rank(everybody.terms, jnp.int32(0)))
@@ -99,8 +95,8 @@ def test_who_does_best_in_the_first_start_is_judged_as_if_all_were(
             assert fitness == -np.inf
 
 
-def test_only_what_was_run_is_counted(half: Trials, everybody: Evaluation):
-    """Six in the first start, three of them in two more."""
+def test_only_trials_that_were_run_are_counted(half: Trials, everybody: Evaluation):
+    """Six individuals run the first trial, three of them two more."""
     _, some, counted, _ = half
     promoted = {genome for genome, (_, fitness) in by_genome(some).items() if np.isfinite(fitness)}
     ran = [
@@ -113,8 +109,8 @@ def test_only_what_was_run_is_counted(half: Trials, everybody: Evaluation):
     assert int(counted.computed_steps) >= int(counted.sim_steps)
 
 
-def test_quartiles_are_of_those_who_were_judged(half: Trials):
-    """As the mean is; half of the population has no fitness. Between two of them it is either."""
+def test_quartiles_cover_only_evaluated_individuals(half: Trials):
+    """Like the mean; half of the population has no fitness. Between two values either is right."""
     _, state, told, _ = half
     evaluation = state.fitness[np.isfinite(state.fitness)]
     assert 0 < len(evaluation) < len(state.fitness)
@@ -124,8 +120,8 @@ def test_quartiles_are_of_those_who_were_judged(half: Trials):
     assert told.mean == pytest.approx(evaluation.mean(), rel=1e-5)
 
 
-def test_a_start_that_is_not_wanted_is_not_simulated(half: Trials, everybody: Evaluation):
-    """It has no verdict, and those of the others are what they are when all are wanted."""
+def test_a_trial_that_is_not_requested_is_not_simulated(half: Trials, everybody: Evaluation):
+    """It has no result; the other results are as if all trials were requested."""
     wanted = np.arange(18).reshape(6, 3) % 4 == 1
     some = half[-1](wanted)
     assert np.isnan(some.outcome[~wanted]).all()
@@ -137,14 +133,14 @@ def test_a_start_that_is_not_wanted_is_not_simulated(half: Trials, everybody: Ev
 
 
 def judged_first(values: list[float]) -> Evaluation:
-    """A verdict on the first trial alone."""
+    """An evaluation of the first trial only."""
     terms = jnp.full((len(values), 2, 1), jnp.nan).at[:, 0, 0].set(jnp.array(values))
     nothing = jnp.zeros((len(values), 2), bool)
     return Evaluation(terms, terms, nothing, jnp.int32(0), jnp.int32(0))
 
 
 def promoted_of(values: list[float], share: float, seeded: int = 0, **settings: Any) -> list[int]:
-    """The places of those promoted of six that come to these values in the first start."""
+    """Indices of the promoted among six individuals with these values in the first trial."""
     config = EvolutionConfig(population=6, **settings)
     box = Box(*(Genome(jnp.full((1, 1), end), jnp.full(1, end)) for end in (-1.0, 1.0)))
 
@@ -180,8 +176,8 @@ def test_the_best_of_the_first_start_are_promoted(
 
 
 @pytest.mark.parametrize(("seeded", "promoted"), [(6, [0, 1, 5]), (0, [4, 5])])
-def test_whoever_is_judged_once_more_is_tried_in_all_starts(seeded: int, promoted: list[int]):
-    """The elite is, whatever it did in the first start; before there is one nobody is."""
+def test_the_elite_runs_all_trials(seeded: int, promoted: list[int]):
+    """Its first result does not matter. Before there is an elite, all must be promoted."""
     share = 0.17 if seeded else 0.34
     values = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
     assert promoted_of(values, share, seeded, survival="children", elite=0.34) == promoted

@@ -1,7 +1,6 @@
-"""The command as a user runs it: a folder with everything, kills that lose nothing, mistakes in
-one sentence.
+"""The train command: a complete run folder, kills that lose nothing, mistakes in one sentence.
 
-Its generations simulate nothing, but where it is said; `test_library` simulates runs.
+Generations simulate nothing unless stated; `test_library` simulates runs.
 """
 
 import contextlib
@@ -59,7 +58,7 @@ from mjxgait.training import stages
 stages.evaluate = made_up_evaluate
 main(sys.argv[1:])
 """
-"""The command, but its generations simulate nothing."""
+"""The command, with generations that simulate nothing."""
 
 KILLED = """
 import os, signal, sys, time
@@ -77,7 +76,7 @@ def saved(checkpoints, state, *others):
 
 Checkpoints.save = saved
 """
-"""What kills a process while it saves generation 4 of the run that is its last argument."""
+"""Kills its process while it saves generation 4 of the run named by the last argument."""
 SIMULATED = "from mjxgait.cli import main; main()"
 
 
@@ -105,7 +104,7 @@ def nothing_is_simulated() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A run that nobody interrupted, and what it said."""
+    """An uninterrupted run and its output."""
     folder, said = tmp_path_factory.mktemp("runs") / "whole", io.StringIO()
     with contextlib.redirect_stdout(said), pytest.raises(SystemExit) as found:
         main(["train", *SMALL, "--out", str(folder)])
@@ -161,7 +160,7 @@ def test_the_folder_holds_the_whole_run(finished: tuple[Path, str]):
     assert "Compiling" in said
 
 
-def test_one_plain_line_per_generation_where_there_is_no_terminal(finished: tuple[Path, str]):
+def test_one_plain_line_per_generation_without_a_terminal(finished: tuple[Path, str]):
     lines = [line for line in finished[1].splitlines() if line.startswith("generation")]
     assert len(lines) == 8
     assert all(
@@ -179,7 +178,7 @@ def test_the_same_seed_gives_the_same_champion(
 
 
 def kill_when(ready: Callable[[], bool], *arguments: object, code: str = COMMAND) -> int:
-    """Starts a command and kills it as soon as `ready` holds; returns its exit code."""
+    """Start a command, kill it as soon as `ready` holds, and return its exit code."""
     process = subprocess.Popen(
         command(*arguments, code=code),
         stdout=subprocess.DEVNULL,
@@ -205,16 +204,16 @@ def saving(folder: Path, generation: int) -> Callable[[], bool]:
 
 
 class Killed(BaseException):
-    """Nothing in the program catches it."""
+    """An exception that the program never catches."""
 
 
-def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
+def test_a_repeatedly_killed_run_reaches_the_same_champion_bit_for_bit(
     finished: tuple[Path, str],
     tmp_path: Path,
     capsys: pytest.CaptureFixture,
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """Ended between log and checkpoint, killed amid a checkpoint: it goes on from what was left."""
+    """Ended between log and checkpoint, then killed during a checkpoint."""
     folder, save = tmp_path / "killed", Checkpoints.save
 
     def saved(checkpoints: Checkpoints, state, *others: str) -> None:
@@ -237,8 +236,8 @@ def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
 
 
 @pytest.mark.thorough("one that simulates nothing is killed too, and `test_library` repeats a run")
-def test_a_run_that_simulates_is_killed_again_and_again_too(tmp_path: Path):
-    """In processes of its own, killed in a generation and amid a checkpoint."""
+def test_a_repeatedly_killed_simulating_run_reaches_the_same_champion(tmp_path: Path):
+    """In its own processes, killed during a generation and during a checkpoint."""
     whole, folder, codes = tmp_path / "whole", tmp_path / "killed", []
     done = ended("train", *SMALL, "--out", whole, code=SIMULATED)
     assert done.returncode == 0, done.stderr
@@ -255,7 +254,7 @@ def test_a_run_that_simulates_is_killed_again_and_again_too(tmp_path: Path):
 
 
 @pytest.mark.thorough("a run that is killed twice is compared too")
-def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
+def test_a_run_killed_between_checkpoints_repeats_from_the_first(
     finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     folder = tmp_path / "killed"
@@ -273,7 +272,7 @@ def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
     assert without_times(folder) == without_times(finished[0])
 
 
-def test_going_on_from_an_earlier_checkpoint_drops_the_later_and_comes_to_the_same_end(
+def test_resuming_an_earlier_checkpoint_drops_later_ones_and_repeats_them(
     finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     folder = tmp_path / "again"
@@ -285,7 +284,7 @@ def test_going_on_from_an_earlier_checkpoint_drops_the_later_and_comes_to_the_sa
     assert {path.name for path in folder.iterdir()} == {p.name for p in finished[0].iterdir()}
 
 
-def test_twice_interrupted_is_the_same_too(
+def test_a_run_interrupted_twice_gives_the_same_champion(
     finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     folder = tmp_path / "stopped"
@@ -295,7 +294,7 @@ def test_twice_interrupted_is_the_same_too(
     assert result(folder) == result(finished[0])
 
 
-def test_a_damaged_champion_is_written_anew_from_the_checkpoint(
+def test_a_damaged_champion_is_rewritten_from_the_checkpoint(
     finished: tuple[Path, str], tmp_path: Path
 ):
     folder = tmp_path / "damaged"
@@ -310,7 +309,7 @@ def test_a_damaged_champion_is_written_anew_from_the_checkpoint(
     assert result(folder) == result(finished[0]), "one that can be read is left as it is"
 
 
-def test_a_run_that_is_over_says_how_to_go_on_and_does_nothing(
+def test_a_finished_run_says_how_to_go_on_and_does_nothing(
     finished: tuple[Path, str], tmp_path: Path, capsys, monkeypatch
 ):
     folder = tmp_path / "over"
@@ -359,7 +358,7 @@ def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
     assert (folder / "checkpoints" / str(last)).is_dir()
 
 
-def test_what_comes_next_is_said_before_plots_are_drawn_which_may_be_interrupted(
+def test_next_steps_are_printed_before_plots_that_may_be_interrupted(
     tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ):
     def interrupted(run: Path):
@@ -429,7 +428,7 @@ def test_help_reads_well(capsys: pytest.CaptureFixture):
     assert "--seed" in text
 
 
-def test_the_script_is_the_command(tmp_path: Path):
+def test_the_train_script_runs_the_command(tmp_path: Path):
     script = Path(__file__).parents[2] / "scripts" / "train.py"
     done = subprocess.run(
         [sys.executable, str(script), "--env", "dragon"],

@@ -1,4 +1,4 @@
-"""What a run says at its end."""
+"""What a run prints as it progresses and at its end."""
 
 import io
 from pathlib import Path
@@ -21,7 +21,7 @@ from mjxgait.training.screen import Screen, duration
     ],
     ids=["judged", "nobody judged"],
 )
-def test_the_report_tells_the_best_or_that_there_is_none(
+def test_the_report_names_the_best_or_says_that_there_is_none(
     tmp_path: Path, best: float | None, forward: float | None, said: tuple[str, ...]
 ):
     out = io.StringIO()
@@ -31,8 +31,8 @@ def test_the_report_tells_the_best_or_that_there_is_none(
     assert all(words in out.getvalue() for words in said)
 
 
-def test_a_verdict_without_numbers_is_a_sentence():
-    """Of a motion that strides nowhere most measures have no value, and the worst margin is -inf."""
+def test_a_result_without_numbers_is_a_sentence():
+    """Without strides most measures have no value, and the worst margin is -inf."""
     out = io.StringIO()
     screen = Screen(Console(file=out, width=300))
     periodic = Criterion(3, "periodic", (Measure("variation", float("nan"), "<=", 0.1, 0.1),))
@@ -45,7 +45,7 @@ def test_a_verdict_without_numbers_is_a_sentence():
     assert "inf" not in told
 
 
-def test_a_run_that_has_ended_tells_what_to_do_next(tmp_path: Path):
+def test_a_finished_run_prints_the_next_commands(tmp_path: Path):
     out = io.StringIO()
     screen = Screen(Console(file=out, width=300))
     run = tmp_path / "a run"
@@ -58,7 +58,7 @@ def test_a_run_that_has_ended_tells_what_to_do_next(tmp_path: Path):
     assert f"mjxgait inspect '{run}'" in out.getvalue()
 
 
-def test_the_words_of_a_line_are_explained_once():
+def test_the_terms_of_a_progress_line_are_explained_once():
     out = io.StringIO()
     screen = Screen(Console(file=out, width=300))
     line = {"best": 1.0, "mean": 0.5, "episodes": 8, "failures": 2, "forced": False}
@@ -71,7 +71,7 @@ def test_the_words_of_a_line_are_explained_once():
 
 
 def time_left(**tables: dict) -> list[str]:
-    """What is said of the time that is left after generation 0, which took 1.5 s."""
+    """The printed lines on the time left after generation 0, which took 1.5 s."""
     out = io.StringIO()
     line = {"generation": 0, "wall_s": 1.5, "steps_per_second": 9, "episodes": 8, "failures": 2}
     scores = {"best": 1.0, "mean": 0.5, "forced": False}
@@ -92,8 +92,8 @@ def test_the_time_left_is_a_bound_where_a_run_may_end_sooner():
     assert tried.endswith("ends sooner when forced evolution no longer pays")
 
 
-def test_the_time_left_counts_what_lies_between_generations(monkeypatch: pytest.MonkeyPatch):
-    """Examinations, of which the log of a generation says nothing."""
+def test_the_time_left_includes_time_between_generations(monkeypatch: pytest.MonkeyPatch):
+    """Examinations take time that no generation's log contains."""
     clock = iter((100.0, 100.0, 109.0))
     stopped = SimpleNamespace(perf_counter=lambda: next(clock))
     monkeypatch.setattr("mjxgait.training.screen.time", stopped)
@@ -106,7 +106,7 @@ def test_the_time_left_counts_what_lies_between_generations(monkeypatch: pytest.
     assert "at most 45 s left" in out.getvalue().splitlines()[-1]
 
 
-def test_times_are_in_a_unit_that_suits_them():
+def test_durations_have_a_suitable_unit():
     assert [duration(s) for s in (0.4, 119, 150, 7100, 9000)] == [
         "0 s",
         "119 s",

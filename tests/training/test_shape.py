@@ -1,4 +1,4 @@
-"""Which runs share compiled programs; other bodies and sizes are tried in `test_library`."""
+"""Which runs share compiled programs; `test_library` covers other bodies and sizes."""
 
 import dataclasses
 
@@ -11,8 +11,8 @@ from mjxgait.plugins import registry
 from mjxgait.training.experiment import program_key
 
 
-def test_numbers_are_free(stool: Creature):
-    """So is the seed, and the lock that is held while a program is compiled has the same name."""
+def test_numbers_do_not_change_the_program_key(stool: Creature):
+    """Nor does the seed; the lock held during compilation keeps its name too."""
     config = small_config(drive={"law": "pd"}, fitness={"weights": {"slip": 3.0}})
     one, other = (
         program_key(stool, each) for each in (small_config(), dataclasses.replace(config, seed=5))
@@ -23,7 +23,7 @@ def test_numbers_are_free(stool: Creature):
 
 
 @pytest.mark.parametrize("kind", ["controller", "task"])
-def test_code_of_the_same_name_that_was_defined_anew_is_other_code(
+def test_redefined_code_of_the_same_name_changes_the_program_key(
     stool: Creature, kind: str, monkeypatch: pytest.MonkeyPatch
 ):
     before = program_key(stool, small_config())

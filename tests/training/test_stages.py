@@ -1,4 +1,4 @@
-"""Which of a generation's programs is worth the compiler's best."""
+"""Compiler options of each program of a generation."""
 
 import pytest
 
@@ -9,15 +9,17 @@ from mjxgait.training.stages import compile_stages
 
 
 class Written:
-    """A program that tells what the compiler was told."""
+    """A program that returns its compiler options."""
 
     def compile(self, compiler_options: dict) -> dict:
         return compiler_options
 
 
 @pytest.mark.parametrize(("long", "level"), [(False, "0"), (True, "1")])
-def test_only_what_simulates_is_optimized(monkeypatch: pytest.MonkeyPatch, long: bool, level: str):
-    """And a little what takes long to propose."""
+def test_only_the_simulation_is_fully_optimized(
+    monkeypatch: pytest.MonkeyPatch, long: bool, level: str
+):
+    """A proposal that takes long is optimized a little."""
     monkeypatch.setattr("jax.default_backend", lambda: "cpu")
     written = [(part, Written()) for part in ("propose", "evaluate", "absorb")]
     stages = compile_stages(written, long=long)
@@ -26,7 +28,7 @@ def test_only_what_simulates_is_optimized(monkeypatch: pytest.MonkeyPatch, long:
     assert stages.absorb["xla_backend_optimization_level"] == "0"
 
 
-def test_expressions_take_long_and_poses_do_not(stool: Creature):
+def test_variation_is_long_for_expressions_and_not_for_poses(stool: Creature):
     variations = [
         build_experiment(stool, resolve_config({}, "stool", use={"controller": name}))
         for name in ("program", "poses")
@@ -38,7 +40,7 @@ def test_expressions_take_long_and_poses_do_not(stool: Creature):
     assert found == [True, False]
 
 
-def test_other_machines_have_their_own_compilers(monkeypatch: pytest.MonkeyPatch):
+def test_other_backends_get_no_compiler_options(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("jax.default_backend", lambda: "gpu")
     stages = compile_stages(
         [("propose", Written()), ("evaluate", Written()), ("absorb", Written())]

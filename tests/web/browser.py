@@ -13,7 +13,7 @@ SOFTWARE_GL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-s
 
 
 def launch(playwright):
-    """Chromium with GL in software; skips where there is none."""
+    """Chromium with software GL; skips without Chromium."""
     program = next(
         (
             found
@@ -28,7 +28,7 @@ def launch(playwright):
 
 
 def watched_tab(browser, address):
-    """A loaded page, what went wrong in it, and the addresses it asked for."""
+    """A loaded page, its errors, and the addresses it requested."""
     tab = browser.new_page(viewport={"width": 900, "height": 700})
     wrong, asked = [], []
     tab.on(
@@ -42,7 +42,7 @@ def watched_tab(browser, address):
 
 
 def wait_until(tab, expression, seconds=60):
-    """Asks from outside: the pages' own rules forbid the browser's way, which evaluates text."""
+    """Poll from outside: the pages' rules forbid the browser's own way, which evaluates text."""
     end = time.monotonic() + seconds
     while not tab.evaluate(expression):
         assert time.monotonic() < end, f"{expression} did not come true in {seconds} s"
@@ -50,7 +50,7 @@ def wait_until(tab, expression, seconds=60):
 
 
 def canvas(tab):
-    """[height, width, 4] what the 3D canvas shows."""
+    """Pixels [height, width, 4] of the 3D canvas."""
     picture = tab.evaluate("document.getElementById('walk').toDataURL()")
     return np.asarray(
         Image.open(io.BytesIO(base64.b64decode(picture.split(",")[1]))).convert("RGBA"), int
@@ -58,7 +58,7 @@ def canvas(tab):
 
 
 def drawn(tab, seconds=30):
-    """What the canvas shows as soon as it shows something: a model is drawn some time after it has been loaded."""
+    """First pixels that are not blank: a model is drawn some time after it is loaded."""
     end = time.monotonic() + seconds
     while is_blank(picture := canvas(tab)):
         assert time.monotonic() < end, f"the canvas is still blank after {seconds} s"
@@ -67,5 +67,5 @@ def drawn(tab, seconds=30):
 
 
 def is_blank(picture):
-    """Whether next to nothing is drawn on the transparent canvas."""
+    """Whether the transparent canvas is nearly empty."""
     return (picture[..., 3] > 0).mean() < 0.02 or picture[picture[..., 3] > 0][:, :3].std() < 5

@@ -14,7 +14,7 @@ def stool_run(stool, tmp_path_factory):
 def browser():
     """Headless Chromium; needs the apt package chromium and the Python package playwright.
 
-    Closed after a file's tests: a page that moves takes more than a core as long as it is open.
+    Closed after each file: an open animated page takes more than a core.
     """
     playwright = pytest.importorskip(
         "playwright.sync_api", reason="needs the Python package playwright"

@@ -37,7 +37,7 @@ def run(stool, tmp_path):
 
 @pytest.fixture
 def site(run):
-    """A watcher that looks when told to, and the address of its page."""
+    """A watcher that updates on demand, and the address of its page."""
     watcher = Watcher(run)
     server = open_server(watcher, 0)
     threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -47,7 +47,7 @@ def site(run):
 
 
 def improve(run, creature, champion):
-    """As a training does: the champion is replaced, and the log grows."""
+    """Replace the champion and extend the log, as a training does."""
     write_champion(champion, creature, run / CHAMPION)
     with (run / METRICS).open("a") as log:
         log.write(json.dumps(metrics_line(2)) + "\n")
@@ -60,7 +60,7 @@ def get(address, **headers):
         return answer.read()
 
 
-def test_it_follows_the_run(site, run, stool):
+def test_the_page_follows_the_run(site, run, stool):
     watcher, address = site
     watcher.look()
     assert json.loads(get(f"{address}/state.json"))["version"] == 0
@@ -85,8 +85,8 @@ def test_a_champion_that_falls_is_shown_falling(tmp_path):
     assert watcher.shown.glb
 
 
-def test_the_longer_a_look_takes_the_longer_the_pause(run, stool, monkeypatch):
-    """So that looking takes a small share of a core, however slow the machine is."""
+def test_a_longer_update_is_followed_by_a_longer_pause(run, stool, monkeypatch):
+    """Updates take a small share of a core, even on a slow machine."""
     watcher = Watcher(run)
     improve(run, stool, treading(stool))
     began_and_ended = iter([100.0, 103.0])
@@ -111,7 +111,7 @@ def test_only_a_new_champion_is_simulated(run, stool, monkeypatch):
         assert len(seen) == champions
 
 
-def test_only_this_machine_can_reach_it(site):
+def test_only_this_machine_can_reach_the_page(site):
     _, address = site
     with pytest.raises(urllib.error.HTTPError, match="403"):
         get(f"{address}/state.json", Host="evil.example")
@@ -120,7 +120,7 @@ def test_only_this_machine_can_reach_it(site):
             get(address + path)
 
 
-def test_idle_connections_leave_no_room_for_more_and_are_closed(run, monkeypatch):
+def test_idle_connections_are_limited_and_closed(run, monkeypatch):
     monkeypatch.setattr("mjxgait.web.live.CONNECTIONS", 2)
     monkeypatch.setattr("mjxgait.web.live._Handler.timeout", 0.5)
     server = open_server(Watcher(run), 0)
@@ -137,14 +137,14 @@ def test_idle_connections_leave_no_room_for_more_and_are_closed(run, monkeypatch
     server.server_close()
 
 
-def test_a_port_that_is_taken_is_said(site, run):
+def test_a_port_in_use_is_reported(site, run):
     _, address = site
     with pytest.raises(UserError, match="taken by another program"):
         open_server(Watcher(run), int(address.rsplit(":", 1)[1]))
 
 
 @pytest.mark.thorough("the page that follows a training is the same command, and is ended too")
-def test_the_command_tells_its_address_and_ends(run):
+def test_the_command_prints_its_address_and_ends(run):
     viewer = subprocess.Popen(
         [sys.executable, "-m", "mjxgait", "view", str(run)], stdout=subprocess.PIPE, text=True
     )
@@ -171,7 +171,7 @@ def test_a_training_can_be_followed(run, capfd):
         get(address)
 
 
-def test_the_page_shows_the_best_and_the_curve_grows(browser, site, run, stool):
+def test_the_page_shows_the_champion_and_the_curve_grows(browser, site, run, stool):
     watcher, address = site
     improve(run, stool, treading(stool, degrees=12.0))
     watcher.look()

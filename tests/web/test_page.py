@@ -1,4 +1,4 @@
-"""`mjxgait share`: one file that plays by double click and asks the network for nothing.
+"""`mjxgait share`: one file that plays on double click, without network requests.
 
 The browser tests need Chromium (apt: chromium) and the Python package playwright.
 """
@@ -57,7 +57,7 @@ def page(stool, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def opened(browser, page):
-    """The page, open and loaded, with what went wrong and what it asked for."""
+    """The loaded page, its errors and its requests."""
     return watched_tab(browser, page.as_uri())
 
 
@@ -72,13 +72,13 @@ def test_the_canvas_shows_a_creature_that_moves(opened):
     pytest.fail("the creature stands still")
 
 
-def test_nothing_goes_wrong_and_nobody_else_is_asked(opened):
+def test_the_page_has_no_errors_and_no_network_requests(opened):
     _, wrong, asked = opened
     assert wrong == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
 
 
-def test_it_can_be_stopped_and_slowed(opened):
+def test_playback_can_be_paused_and_slowed(opened):
     tab, _, _ = opened
     tab.click("text=half")
     assert tab.evaluate("walk.timeScale") == 0.5
@@ -87,7 +87,7 @@ def test_it_can_be_stopped_and_slowed(opened):
     assert tab.inner_text("#play") == "Play"
 
 
-def test_a_moment_can_be_chosen_and_stepped_from(opened):
+def test_a_moment_can_be_chosen_and_stepped(opened):
     tab, _, _ = opened
     tab.evaluate("time.value = 5; time.dispatchEvent(new Event('input'))")
     frame = tab.evaluate("walk.duration / time.max")
@@ -100,22 +100,22 @@ def test_a_moment_can_be_chosen_and_stepped_from(opened):
     assert tab.evaluate("walk.currentTime") == pytest.approx(4 * frame)
 
 
-def test_the_camera_has_places_to_go_to(opened):
+def test_the_camera_has_preset_views(opened):
     tab, _, _ = opened
     for place, turned in (("side", -90), ("front", 0)):
         tab.click(f'.view:has-text("{place}")')
         assert tab.evaluate("walk.cameraOrbit").startswith(f"{turned}deg")
 
 
-def test_nothing_is_wider_than_a_phone(browser, page):
+def test_the_page_fits_a_phone(browser, page):
     tab = browser.new_page(viewport={"width": 390, "height": 844})
     tab.goto(page.as_uri())
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
     tab.close()
 
 
-def test_a_blank_canvas_would_be_noticed(browser, page, tmp_path):
-    """The test above can fail."""
+def test_a_blank_canvas_is_noticed(browser, page, tmp_path):
+    """The test of the canvas can fail."""
     text = page.read_text(encoding="utf-8")
     start = text.index("base64,", text.index("data:model/gltf-binary")) + len("base64,")
     end = text.index('"', start)
@@ -129,7 +129,7 @@ def test_a_blank_canvas_would_be_noticed(browser, page, tmp_path):
     tab.close()
 
 
-def test_the_page_names_no_place_outside_itself(page):
+def test_the_page_has_no_external_references(page):
     text = page.read_text(encoding="utf-8")
     own = text[: text.index('<script type="module">')]
     assert "default-src 'none'" in own
@@ -139,7 +139,7 @@ def test_the_page_names_no_place_outside_itself(page):
     assert len(text) < 4_000_000
 
 
-def test_the_certificate_is_shown_as_long_as_it_is_this_champions(stool, tmp_path):
+def test_only_a_certificate_of_this_champion_is_shown(stool, tmp_path):
     champion = treading(stool)
     run = write_run(tmp_path / "run", stool, champion)
     assert "Not examined" in certificate_table(run, stool, champion)
@@ -167,7 +167,7 @@ def test_the_certificate_is_shown_as_long_as_it_is_this_champions(stool, tmp_pat
         certificate_table(run, stool, champion)
 
 
-def test_what_a_champion_bears_beyond_it_is_shown_beside_it(stool, tmp_path):
+def test_stress_results_are_shown_beside_the_certificate(stool, tmp_path):
     champion = treading(stool)
     run = write_run(tmp_path / "run", stool, champion)
     (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
@@ -183,7 +183,7 @@ def test_what_a_champion_bears_beyond_it_is_shown_beside_it(stool, tmp_path):
         certificate_table(run, stool, champion)
 
 
-def test_what_cannot_be_is_said(stool, stool_run, tmp_path, capsys):
+def test_invalid_input_is_reported(stool, stool_run, tmp_path, capsys):
     assert share(stool_run, tmp_path / "walk.pdf") == 2
     assert share(stool_run, tmp_path / "missing" / "walk.html") == 2
     assert share(tmp_path, tmp_path / "walk.html") == 2

@@ -1,4 +1,4 @@
-"""Cycles that a formula draws, as files of each kind that is read."""
+"""Cycles from a formula, as files of each readable kind."""
 
 import json
 from pathlib import Path
@@ -17,7 +17,7 @@ RATE, PERIOD = 30, 0.8
 
 
 def swings(creature: Creature, cycles: float = 1.0, mirrored: bool = False) -> np.ndarray:
-    """Angles [F, J] rad: each joint swings within its range, out of step with the others."""
+    """Angles [F, J] rad: each joint swings within its range, out of phase with the others."""
     joints = creature.joints
     room = np.minimum(joints.pose_high - joints.stand, joints.stand - joints.pose_low)
     phase = np.arange(len(room)) * 0.7
@@ -33,7 +33,7 @@ def swings(creature: Creature, cycles: float = 1.0, mirrored: bool = False) -> n
 
 
 def poses(creature: Creature, angles: np.ndarray) -> np.ndarray:
-    """[F, nq] with these angles, the trunk as it stands."""
+    """Positions [F, nq] with these angles and the standing trunk."""
     qpos = np.tile(creature.stand_qpos, (len(angles), 1))
     qpos[:, creature.joints.qpos_adr] = angles
     return qpos
@@ -47,7 +47,7 @@ def glb(creature: Creature, angles: np.ndarray) -> bytes:
 
 
 def bvh(creature: Creature, angles: np.ndarray, order: str = "ZXY") -> str:
-    """A skeleton that rests as the creature stands, each part a joint."""
+    """A skeleton that rests in the stand, with a joint for each part."""
     model, data = creature.model, mujoco.MjData(creature.model)
     axes = gltf_axes(creature.frame.start_axes[0][:2])
     worlds = []
@@ -97,7 +97,7 @@ def table(creature: Creature, angles: np.ndarray) -> str:
 
 
 def write(folder: Path, kind: str, creature: Creature, angles: np.ndarray) -> Path:
-    """A file of a kind: its ending."""
+    """A file of a kind, named by its ending."""
     file = folder / f"walk.{kind}"
     match kind:
         case "glb":

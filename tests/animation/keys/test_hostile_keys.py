@@ -1,4 +1,4 @@
-"""Files that are damaged or were never meant: one sentence each, and nothing is written."""
+"""Damaged or unsuitable files: one sentence each, and nothing is written."""
 
 import contextlib
 import json
@@ -144,7 +144,7 @@ TEXT = {
 
 
 def refused(creature: Creature, file: Path) -> str:
-    """The one sentence; the folder is as it was."""
+    """The one sentence of the error; the folder is unchanged."""
     before = {f: f.read_bytes() for f in file.parent.iterdir()}
     with pytest.raises(UserError) as raised:
         bring(creature, file)
@@ -181,7 +181,9 @@ def test_a_bad_text_is_one_sentence(stool: Creature, tmp_path: Path, name: str):
         ("no.glb", "no such"),
     ],
 )
-def test_what_cannot_be_read_has_a_way_out(stool: Creature, tmp_path: Path, name: str, words: str):
+def test_an_unreadable_file_is_refused_with_a_way_out(
+    stool: Creature, tmp_path: Path, name: str, words: str
+):
     if name.startswith("walk"):
         (tmp_path / name).write_text("x")
     with pytest.raises(UserError, match=words):
@@ -189,8 +191,8 @@ def test_what_cannot_be_read_has_a_way_out(stool: Creature, tmp_path: Path, name
 
 
 @pytest.mark.parametrize("kind", ["glb", "bvh", "csv", "json"])
-def test_whatever_happens_to_a_file_on_its_way_there_is_no_traceback(stool, tmp_path, kind):
-    """Cut off anywhere, or with bytes changed: a sentence, or a cycle."""
+def test_a_corrupted_file_gives_no_traceback(stool, tmp_path, kind):
+    """Cut off anywhere, or with changed bytes: a sentence or a cycle."""
     make = {"glb": glb, "bvh": bvh, "csv": columns, "json": table}[kind]
     whole = make(stool, swings(stool))
     whole = whole if isinstance(whole, bytes) else whole.encode()

@@ -1,4 +1,4 @@
-"""What an animator has keyed comes in as it was drawn: names, angles, cycle, key poses."""
+"""An animator's cycle is read as it was drawn: names, angles, cycle, key poses."""
 
 import dataclasses
 import json
@@ -29,11 +29,11 @@ LOOSE = np.radians(90.0)
 
 
 def worst(found: np.ndarray, wanted: np.ndarray) -> float:
-    """Degrees."""
+    """Largest difference, degrees."""
     return float(np.degrees(np.abs(found - wanted).max()))
 
 
-def test_what_was_exported_comes_back_as_the_same_poses(shipped: Creature, tmp_path: Path):
+def test_an_exported_cycle_is_read_back_with_the_same_angles(shipped: Creature, tmp_path: Path):
     angles = swings(shipped, mirrored=True)
     file = write(tmp_path, "glb", shipped, angles[::4])
     brought = bring(shipped, file, tolerance=LOOSE)
@@ -43,7 +43,7 @@ def test_what_was_exported_comes_back_as_the_same_poses(shipped: Creature, tmp_p
 
 
 @pytest.mark.parametrize("kind", ["glb", "bvh", "csv", "json"])
-def test_every_kind_of_file_tells_the_same(stool: Creature, tmp_path: Path, kind: str):
+def test_every_kind_of_file_gives_the_same_cycle(stool: Creature, tmp_path: Path, kind: str):
     angles = swings(stool, cycles=2)
     brought = bring(stool, write(tmp_path, kind, stool, angles), tolerance=LOOSE)
     assert worst(brought.track.angles, angles) < 0.05
@@ -52,7 +52,7 @@ def test_every_kind_of_file_tells_the_same(stool: Creature, tmp_path: Path, kind
 
 @pytest.mark.parametrize("order", ["XYZ", "YZX", "ZYX"])
 def test_angles_of_a_bvh_file_are_in_the_order_that_it_names(tmp_path, order):
-    """Of a duck: its hips and ankles turn about several axes, one below the other."""
+    """A duck's hips and ankles turn about several axes in series."""
     duck = load_creature(find_creature("duck"))
     angles = swings(duck)[::6]
     file = tmp_path / "walk.bvh"
@@ -60,15 +60,15 @@ def test_angles_of_a_bvh_file_are_in_the_order_that_it_names(tmp_path, order):
     assert worst(bring(duck, file, tolerance=LOOSE).track.angles, angles) < 0.05
 
 
-def test_degrees_are_said_by_the_column(stool: Creature, tmp_path: Path):
+def test_a_column_name_can_state_degrees(stool: Creature, tmp_path: Path):
     angles = swings(stool)
     file = tmp_path / "walk.csv"
     file.write_text(columns(stool, angles, degrees=True))
     assert worst(bring(stool, file, tolerance=LOOSE).track.angles, angles) < 0.01
 
 
-def test_a_bone_turned_in_the_file_turns_the_joint_as_far(stool: Creature, tmp_path: Path):
-    """As an animator would: one leg ten degrees further forward in all frames."""
+def test_a_bone_turned_in_the_file_turns_the_joint_equally(stool: Creature, tmp_path: Path):
+    """One leg is ten degrees further forward in all frames."""
     angles = swings(stool)
     angles[:, 1] += np.radians(10.0)
     before = bring(stool, write(tmp_path, "glb", stool, swings(stool)), tolerance=LOOSE)
@@ -78,8 +78,8 @@ def test_a_bone_turned_in_the_file_turns_the_joint_as_far(stool: Creature, tmp_p
     assert np.delete(change, 1, axis=1) == pytest.approx(0.0, abs=0.1)
 
 
-def test_joints_whose_drawn_pose_is_not_their_zero_come_back(stool: Creature, tmp_path: Path):
-    """MuJoCo's `ref`: the angle that the pose in the file is called."""
+def test_joints_with_an_offset_zero_are_read_back(stool: Creature, tmp_path: Path):
+    """MuJoCo's `ref`: the joint angle of the pose in the file."""
     folder = shutil.copytree(STOOL, tmp_path / "offset")
     xml = (folder / "creature.xml").read_text()
     xml = xml.replace('name="front_left_hip"', 'name="front_left_hip" ref="0.3"')
@@ -90,7 +90,7 @@ def test_joints_whose_drawn_pose_is_not_their_zero_come_back(stool: Creature, tm
     assert worst(brought.track.angles, angles) < 0.05
 
 
-def test_what_a_joint_cannot_do_is_told(stool: Creature, tmp_path: Path):
+def test_angles_beyond_a_joint_range_are_reported(stool: Creature, tmp_path: Path):
     angles = np.tile(stool.joints.stand, (20, 1))
     beyond = np.degrees(stool.joints.high[0]) + 30.0
     angles[10:, 0] = np.radians(beyond)
@@ -120,7 +120,7 @@ def test_left_is_never_taken_for_right():
     assert matched(["left_foot"], ["right_foot"], None, "") == {}
 
 
-def test_a_table_goes_before_likeness():
+def test_a_name_table_overrides_similarity():
     assert matched(["a_left"], ["a_left", "x"], {"a_left": "x"}, "") == {"a_left": "x"}
     with pytest.raises(UserError, match='"y" is not there'):
         matched(["a_left"], ["a_left", "x"], {"a_left": "y"}, "names.toml")
@@ -133,7 +133,7 @@ def test_the_period_is_found(stool: Creature, cycles: float):
     assert cycle.period == pytest.approx(PERIOD, rel=0.02)
 
 
-def test_the_user_may_say_where_a_cycle_is(stool: Creature):
+def test_the_user_can_give_the_limits_of_a_cycle(stool: Creature):
     angles = swings(stool, cycles=2)
     cycle = find_cycle(stool, np.arange(len(angles)) / RATE, angles, 0.2, 0.2 + PERIOD)
     assert (cycle.begins, cycle.period) == (pytest.approx(0.2), pytest.approx(PERIOD))
@@ -142,7 +142,7 @@ def test_the_user_may_say_where_a_cycle_is(stool: Creature):
 
 
 @pytest.mark.parametrize("mirrored", [True, False])
-def test_a_mirrored_cycle_is_known_as_one(shipped: Creature, mirrored: bool):
+def test_a_mirrored_cycle_is_recognized(shipped: Creature, mirrored: bool):
     angles = swings(shipped, mirrored=mirrored)
     cycle = find_cycle(shipped, np.arange(len(angles)) / RATE, angles)
     moves = any(j != p for j, p in enumerate(shipped.mirror.partner))
@@ -154,7 +154,7 @@ def test_a_mirrored_cycle_is_known_as_one(shipped: Creature, mirrored: bool):
         assert not cycle.mirrored
 
 
-def test_a_cycle_of_key_poses_is_found_again_with_no_pose_too_many(stool: Creature):
+def test_fitting_a_cycle_of_key_poses_gives_exactly_these_poses(stool: Creature):
     drawn = swings(stool, 1.0)[[0, 5, 11, 19]]
     samples = 120
     at = np.arange(samples) / samples * len(drawn)
@@ -165,7 +165,7 @@ def test_a_cycle_of_key_poses_is_found_again_with_no_pose_too_many(stool: Creatu
     assert worst(fit.key_poses, drawn) < 0.1
 
 
-def test_more_poses_are_taken_where_fewer_do_not_do(shipped: Creature):
+def test_a_finer_tolerance_is_met_with_more_key_poses(shipped: Creature):
     angles = swings(shipped, mirrored=True)
     cycle = find_cycle(shipped, np.arange(len(angles)) / RATE, angles)
     rough, fine = (fit_poses(shipped, cycle, np.radians(d)) for d in (8.0, 2.0))
@@ -173,7 +173,7 @@ def test_more_poses_are_taken_where_fewer_do_not_do(shipped: Creature):
     assert fine.error <= np.radians(2.0)
 
 
-def test_of_a_long_file_the_user_says_which_seconds(stool: Creature, tmp_path: Path):
+def test_a_long_file_needs_the_limits_of_the_cycle(stool: Creature, tmp_path: Path):
     angles = swings(stool, cycles=70)
     file = write(tmp_path, "csv", stool, angles)
     with pytest.raises(UserError, match="--from and --to"):
@@ -184,13 +184,13 @@ def test_of_a_long_file_the_user_says_which_seconds(stool: Creature, tmp_path: P
 
 @pytest.fixture
 def exported(stool: Creature) -> WalkLoop:
-    """A walk whose joints follow their targets late and not all the way."""
+    """A walk with joints that follow their targets late and incompletely."""
     walk = Walk(stool, treading(stool, degrees=12.0), None, np.inf)
     qpos = poses(stool, swings(stool))
     return WalkLoop(walk, qpos, RATE, 1, 0.0, 1.0, (0, len(qpos) - 1))
 
 
-def test_an_exported_walk_comes_back_with_the_key_poses_that_made_it(exported, tmp_path):
+def test_an_exported_walk_is_read_back_with_its_own_key_poses(exported, tmp_path):
     creature, champion = exported.walk.creature, exported.walk.champion
     export_glb(exported, tmp_path / "walk.glb")
     own = bring(creature, tmp_path / "walk.glb", tolerance=LOOSE).own
@@ -201,8 +201,8 @@ def test_an_exported_walk_comes_back_with_the_key_poses_that_made_it(exported, t
 
 
 @pytest.mark.parametrize("degrees", [2.0, 10.0])
-def test_what_is_bent_in_the_file_is_bent_in_its_key_poses(exported, tmp_path, degrees):
-    """One hip in all frames, as an animator would; also by so little that both sides are alike."""
+def test_a_joint_bent_in_the_file_is_bent_in_the_key_poses(exported, tmp_path, degrees):
+    """One hip in all frames; also by so little that both sides look alike."""
     creature, champion = exported.walk.creature, exported.walk.champion
     brought = edited(exported, {1: degrees}, tmp_path)
     own = brought.own
@@ -214,7 +214,7 @@ def test_what_is_bent_in_the_file_is_bent_in_its_key_poses(exported, tmp_path, d
     assert np.delete(moved, 1, axis=1) == pytest.approx(0.0, abs=0.5)
 
 
-def test_what_is_bent_on_both_sides_stays_mirrored(exported, tmp_path):
+def test_joints_bent_on_both_sides_stay_mirrored(exported, tmp_path):
     creature, champion = exported.walk.creature, exported.walk.champion
     bends = {1: 8.0, int(creature.mirror.partner[1]): 8.0 * creature.mirror.sign[1]}
     brought = edited(exported, bends, tmp_path)
@@ -227,7 +227,7 @@ def test_what_is_bent_on_both_sides_stays_mirrored(exported, tmp_path):
 
 
 def edited(exported: WalkLoop, bends: dict[int, float], folder: Path) -> Brought:
-    """What is read of a walk whose joints were bent by degrees in the exported file."""
+    """Read an exported walk with joints bent by these degrees in the file."""
     creature, bent = exported.walk.creature, exported.qpos.copy()
     for joint, degrees in bends.items():
         bent[:, creature.joints.qpos[joint]] += np.radians(degrees)
@@ -238,7 +238,7 @@ def edited(exported: WalkLoop, bends: dict[int, float], folder: Path) -> Brought
     return bring(creature, folder / "walk.glb", tolerance=LOOSE)
 
 
-def test_a_walk_of_another_creature_is_a_cycle_like_any_other(stool, exported, tmp_path):
+def test_a_walk_of_another_creature_is_read_as_a_plain_cycle(stool, exported, tmp_path):
     document = gltf.GLTF2.load_from_bytes(build_glb(exported))
     note = json.loads(document.nodes[0].extras[NOTE])
     for changed in (note | {"creature": "other"}, note | {"motion": {}}, []):

@@ -1,4 +1,4 @@
-"""A refined cycle stays near the one that was drawn: a run like any other, and what changed in words."""
+"""A refined cycle stays near the drawn one, in an ordinary run that reports the changes."""
 
 import dataclasses
 import json
@@ -55,7 +55,7 @@ def brought(stool: Creature, tmp_path_factory) -> Brought:
 
 
 @pytest.mark.parametrize(("keep", "within"), [(1.0, 0.0), (0.5, 15.0), (0.0, 30.0)])
-def test_poses_stay_as_near_as_they_are_kept(stool, brought, keep: float, within: float):
+def test_poses_stay_within_the_range_set_by_keep(stool, brought, keep: float, within: float):
     config = refining(small_config(), brought, keep).controller
     low, high = PoseTracker(stool, 0.005).bounds(config)
     drawn = brought.fit.key_poses
@@ -68,7 +68,7 @@ def test_poses_stay_as_near_as_they_are_kept(stool, brought, keep: float, within
     assert slower == pytest.approx(1.0 + 0.3 * (1.0 - keep))
 
 
-def test_the_first_that_is_made_is_the_one_that_was_drawn(stool, brought):
+def test_the_first_individual_is_the_drawn_cycle(stool, brought):
     config = refining(small_config(), brought, 0.5).controller
     variation = PoseTracker(stool, 0.005).variation(config, EvolutionConfig())
     made = variation.create(key_of(0), 4)
@@ -76,8 +76,8 @@ def test_the_first_that_is_made_is_the_one_that_was_drawn(stool, brought):
     assert np.abs(made.key_poses[1] - brought.fit.key_poses).max() > 0.01
 
 
-def test_a_walk_that_names_its_genes_begins_close_to_them(stool, brought):
-    """It has walked already; a cycle that nobody has simulated is sought further off."""
+def test_a_walk_with_known_genes_starts_close_to_them(stool, brought):
+    """It has walked already; a cycle that was never simulated needs a wider search."""
     own = Own(brought.fit, brought.cycle, 0.0, "error", dict.fromkeys(TUNING, 0.0))
     usual, close = (
         refining(small_config(), each, 0.5).evolution.initial_spread
@@ -99,12 +99,12 @@ def test_settings_of_another_creature_are_refused(shipped, brought):
 
 
 @pytest.mark.parametrize("keep", [-0.1, 1.5])
-def test_a_share_lies_between_nothing_and_all(brought, keep: float):
+def test_keep_lies_between_0_and_1(brought, keep: float):
     with pytest.raises(UserError, match="between 0 and 1"):
         refining(small_config(), brought, keep)
 
 
-def test_a_foot_that_reaches_elsewhere_is_told_in_words(stool: Creature):
+def test_a_changed_reach_of_a_foot_is_described_in_words(stool: Creature):
     drawn = swings(stool)
     done = drawn.copy()
     done[:, 1] -= 0.3
@@ -117,7 +117,7 @@ def test_a_foot_that_reaches_elsewhere_is_told_in_words(stool: Creature):
 
 
 def test_the_departure_of_a_walk_is_measured(stool: Creature):
-    """Of one that treads as it was drawn, and of one with a joint five degrees elsewhere."""
+    """For the drawn walk, and for one with a joint five degrees off."""
     champion = treading(stool, degrees=12.0)
     near = np.ravel(champion.genome["key_poses"])
     drawn = dataclasses.replace(champion.settings, around=tuple(map(float, near)))
@@ -147,10 +147,10 @@ def said(capsys: pytest.CaptureFixture, *arguments: object, code: int) -> str:
     return text.out + text.err
 
 
-def test_from_a_file_to_a_run_that_can_be_gone_on_with(
+def test_a_file_becomes_a_run_that_can_be_resumed(
     tmp_path: Path, capsys, stool: Creature, monkeypatch
 ):
-    """Its generations simulate nothing; `test_library` simulates a run."""
+    """Generations simulate nothing; `test_library` simulates a run."""
     monkeypatch.setattr(stages, "evaluate", made_up_evaluate)
     (tmp_path / "small.toml").write_text(SETTINGS)
     file, run = write(tmp_path, "bvh", stool, swings(stool)), tmp_path / "run"
@@ -181,8 +181,8 @@ def test_from_a_file_to_a_run_that_can_be_gone_on_with(
     assert "was not made by `mjxgait refine`" in said(capsys, "--resume", run, code=2)
 
 
-def test_where_evolution_looked_is_no_part_of_who_somebody_is(stool: Creature):
-    """Else champions of before these settings would lose their certificates."""
+def test_the_search_range_does_not_change_the_fingerprint(stool: Creature):
+    """Otherwise champions from before these settings would lose their certificates."""
     champion = treading(stool)
     before = {
         k: v
@@ -195,7 +195,7 @@ def test_where_evolution_looked_is_no_part_of_who_somebody_is(stool: Creature):
 
 
 def ended(run: Path, creature: Creature, share: float, passed: bool) -> None:
-    """As a run leaves its folder."""
+    """Write champion and certificate, as a run does."""
     settings = open_run(run)[1].controller
     near = dataclasses.replace(treading(creature), settings=settings)
     drawn = np.reshape(settings.around, (settings.key_poses, -1))
@@ -209,7 +209,7 @@ def ended(run: Path, creature: Creature, share: float, passed: bool) -> None:
     (run / CERTIFICATE).write_text(json.dumps(document))
 
 
-def test_several_that_keep_more_or_less_are_one_picture(
+def test_runs_with_several_keep_values_make_one_picture(
     tmp_path: Path, capsys, stool, brought, monkeypatch
 ):
     out = tmp_path / "all"
@@ -232,7 +232,7 @@ def test_several_that_keep_more_or_less_are_one_picture(
     assert picture.std() > 10
 
 
-def test_several_are_begun_in_an_empty_folder_only(tmp_path: Path, capsys, stool: Creature):
+def test_several_runs_need_an_empty_folder(tmp_path: Path, capsys, stool: Creature):
     file = write(tmp_path, "csv", stool, swings(stool))
     given = ("--env", STOOL, "--keys", file, "--tolerance", 9, "--out", tmp_path)
     before = {*tmp_path.iterdir()}

@@ -1,4 +1,4 @@
-"""A run of expressions of a second: all tests that train with it share its compiled programs."""
+"""A one-second run of expressions; all tests that train with it share its compiled programs."""
 
 import tomllib
 
@@ -22,7 +22,7 @@ elite = 0.0
 remember = false
 selection = "rank"
 """
-"""As a file of `train --config`."""
+"""Content of a file for `train --config`."""
 
 
 def small_settings() -> dict:

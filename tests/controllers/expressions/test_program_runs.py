@@ -1,4 +1,4 @@
-"""A creature that is moved by expressions: evolved, written, edited by hand, examined again."""
+"""A creature with expressions as its controller: training, storing, editing, inspecting."""
 
 import dataclasses
 import json
@@ -51,28 +51,28 @@ def edit(folder: Path, joint: str, text: str) -> None:
 
 
 def commanded(run: mjxgait.Run, folder: Path) -> np.ndarray:
-    """What a folder's champion wants of the first joint at each step of a fifth of a second."""
+    """Targets of the first joint by a folder's champion, at each control step of 0.2 s."""
     champion = read_champion(folder / CHAMPION, run.creature)
     outcome = simulate(run.creature, champion, nominal_starts(run.creature, 1), 0.2, record=1)
     return outcome.trajectory.target[0, :, 0]
 
 
-def test_evolution_and_examiner_move_everybody_alike(run: mjxgait.Run):
-    """The examiner reads the expressions as text, one node after the other."""
+def test_evolution_and_reference_simulator_move_programs_alike(run: mjxgait.Run):
+    """The reference simulator reads the expressions as text, node by node."""
     snapshot = read_snapshot(run.folder)
     told = snapshot.arrays["outcome"][:, 0, 0]
     everybody = [snapshot.champion(rank + 1) for rank in range(len(told))]
     starts, step = nominal_starts(run.creature, 1), run.creature.model.opt.timestep
-    # The statistics include the state before the last step.
+    # The statistics end before the last step.
     seen = [simulate(run.creature, one, starts, 0.2 - step).travel[0, 0] for one in everybody]
-    # A last bit may turn an `ifltz` the other way, so not all are alike in the end.
+    # Rounding may flip an `ifltz`, so not all individuals agree at the end.
     alike = abs(np.array(seen) - told) < 1e-5
     assert alike.sum() >= 3
     assert np.ptp(told[alike]) > 0.005
 
 
-def test_long_programs_are_simulated_beside_long_ones(run: mjxgait.Run):
-    """A batch's command takes as long as that of its longest program."""
+def test_programs_of_similar_length_share_a_batch(run: mjxgait.Run):
+    """A batch takes as long per command as its longest program."""
     simulator = build_experiment(run.creature, run.config).simulator
     counts = np.array([[3, 9, 1, 4], [2, 9, 8, 0]])
     plans = jax.eval_shape(jax.vmap(simulator.controller.prepare, (0, None)), *genomes_of(run))
@@ -86,27 +86,27 @@ def test_long_programs_are_simulated_beside_long_ones(run: mjxgait.Run):
 
 
 def genomes_of(run: mjxgait.Run) -> tuple[Trees, ProgramConfig]:
-    """The population, and the settings of its controller."""
+    """The population and its controller's settings."""
     arrays = read_snapshot(run.folder).arrays
     trees = Trees(jnp.asarray(arrays["genomes.code"]), jnp.asarray(arrays["genomes.value"]))
     return trees, run.config.controller
 
 
-def test_an_expression_is_asked_every_fourth_step(run: mjxgait.Run, edited: Path):
+def test_an_expression_is_evaluated_every_fourth_step(run: mjxgait.Run, edited: Path):
     joint = run.creature.joints.names[0]
     edit(edited, joint, "t")
     told, step = commanded(run, edited), run.creature.model.opt.timestep
     assert told == pytest.approx(np.arange(len(told)) // 4 * 4 * step)
 
 
-def test_the_champion_is_written_for_people_and_stays_who_it_is(run: mjxgait.Run):
+def test_the_champion_file_is_readable_and_keeps_its_fingerprint(run: mjxgait.Run):
     document = json.loads((run.folder / CHAMPION).read_text())
     assert set(document["genome"]["expressions"]) == set(run.creature.joints.names)
     kept = read_champion(run.folder / CHAMPION, run.creature)
     assert kept.fingerprint == read_snapshot(run.folder).champion(1).fingerprint
 
 
-def test_only_the_senses_that_were_asked_for_are_read(run: mjxgait.Run):
+def test_programs_use_only_the_requested_observations(run: mjxgait.Run):
     texts = json.loads((run.folder / CHAMPION).read_text())["genome"]["expressions"].values()
     words = " ".join(texts).replace("(", " ").replace(")", " ").split()
     names = {word for word in words if word[0].isalpha()} - {"ifltz"}
@@ -122,8 +122,8 @@ def test_inspect_prints_the_expressions(run: mjxgait.Run, capsys: pytest.Capture
         assert len(re.findall(r"[^\s()]+", text)) == nodes
 
 
-def test_inspect_tells_how_many_nodes_matter(run: mjxgait.Run, capsys: pytest.CaptureFixture):
-    """Those that are left in the champion's file, which is simplified."""
+def test_inspect_reports_how_many_nodes_matter(run: mjxgait.Run, capsys: pytest.CaptureFixture):
+    """Those that remain in the champion's file, which is simplified."""
     snapshot = read_snapshot(run.folder)
     told = facts(snapshot)["champion"]
     settled = serializer_of("program").settled(
@@ -135,7 +135,7 @@ def test_inspect_tells_how_many_nodes_matter(run: mjxgait.Run, capsys: pytest.Ca
     assert f"{share:.0%}" in said_by(capsys, "inspect", run.folder, code=0)
 
 
-def test_the_size_of_programs_is_told_of_every_generation(run: mjxgait.Run):
+def test_program_size_is_logged_every_generation(run: mjxgait.Run):
     lines, nodes = read_metrics(run.folder / METRICS), facts(read_snapshot(run.folder))
     assert len(lines) == 3
     assert lines[-1]["nodes_best"] == sum(nodes["champion"]["nodes"])
@@ -147,7 +147,7 @@ def test_the_size_of_programs_is_told_of_every_generation(run: mjxgait.Run):
     assert "strobe" not in drawn
 
 
-def test_an_edited_expression_is_what_moves(run: mjxgait.Run, edited: Path):
+def test_an_edited_expression_takes_effect(run: mjxgait.Run, edited: Path):
     joint, changed = run.creature.joints.names[0], mjxgait.open(edited)
     edit(edited, joint, "0.3")
     assert commanded(run, edited) == pytest.approx(np.full(40, 0.3))
@@ -159,7 +159,7 @@ def test_an_edited_expression_is_what_moves(run: mjxgait.Run, edited: Path):
     ("text", "words"),
     [("(+ a0 a99)", '"a99" is neither a sense nor a number'), ("(+ a0", "ends too early")],
 )
-def test_a_mistake_names_the_file_and_the_joint(
+def test_a_mistake_is_reported_with_file_and_joint(
     run: mjxgait.Run, edited: Path, text: str, words: str, capsys: pytest.CaptureFixture
 ):
     joint = run.creature.joints.names[1]
@@ -180,7 +180,7 @@ def test_a_mistake_names_the_file_and_the_joint(
         (("--controller.every", "3"), "must be one of 1, 2, 4, 8, 16 control steps"),
     ],
 )
-def test_settings_that_cannot_be_are_one_sentence(
+def test_invalid_settings_are_reported_in_one_sentence(
     option: tuple[str, ...], words: str, tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     arguments = ("train", "--env", STOOL, "--controller", "program", "--out", tmp_path / "x")

@@ -1,5 +1,5 @@
-"""Programs as arrays: text, first programs, crossing, mutation and values, against plain readings
-of the same and against DEAP.
+"""Programs as arrays: text, initial programs, crossover, mutation and values, against a plain
+parser and against DEAP.
 """
 
 import operator
@@ -62,7 +62,7 @@ def first_programs(count: int, words: Words = WORDS, seed: int = 0) -> tuple[jax
 
 @pytest.fixture(scope="module")
 def programs(as_shipped: None) -> tuple[np.ndarray, np.ndarray]:
-    """[MANY, NODES] that were crossed and mutated after they were made."""
+    """Random programs [MANY, NODES] after crossover and mutation."""
     tree = first_programs(MANY)
     keys = jax.random.split(key_of(1), (2, MANY))
     other = jax.tree.map(lambda leaf: leaf[::-1], tree)
@@ -82,7 +82,7 @@ def _mutants(keys: jax.Array, code: jax.Array, value: jax.Array, shares: jax.Arr
 
 
 def mutants(keys: jax.Array, tree: Any, shares: jax.Array) -> tuple[np.ndarray, np.ndarray]:
-    """Of one tree [C], [N, C], by mutations of such shares."""
+    """Mutants [N, C] of one tree [C]; `shares`: the share of each kind of mutation."""
     code, value = _mutants(keys, *map(jnp.asarray, tree), shares)
     return np.asarray(code), np.asarray(value)
 
@@ -95,7 +95,7 @@ def taken(code: int) -> int:
 
 
 def plain_end(code: np.ndarray, start: int) -> int:
-    """Where the subtree that begins at a place ends, read node by node."""
+    """End of the subtree that begins at `start`, read node by node."""
     wanted, i, code = 1, start, code.tolist()
     while wanted:
         wanted += taken(code[i]) - 1
@@ -104,7 +104,7 @@ def plain_end(code: np.ndarray, start: int) -> int:
 
 
 def plain_depth(code: np.ndarray) -> int:
-    """Of a whole tree, by recursion."""
+    """Depth of a whole tree, by recursion."""
     nodes = iter(code.tolist())
 
     def below() -> int:
@@ -124,7 +124,7 @@ def test_every_program_is_one_tree_within_its_limits(programs: Any):
     assert max(map(plain_depth, code[::10])) <= SETTINGS.depth
 
 
-def test_subtrees_and_depths_are_those_of_a_plain_reading(programs: Any):
+def test_subtree_sizes_and_depths_match_a_plain_parser(programs: Any):
     code = programs[0][:500]
     sizes = np.asarray(jax.jit(jax.vmap(subtree_sizes))(code))
     deepest = np.asarray(jax.jit(jax.vmap(depths))(code)).max(1)
@@ -134,7 +134,7 @@ def test_subtrees_and_depths_are_those_of_a_plain_reading(programs: Any):
             assert size[i] == plain_end(row, i) - i
 
 
-def test_splicing_is_cutting_and_pasting(programs: Any):
+def test_splicing_matches_cutting_and_pasting(programs: Any):
     largest = np.argsort((programs[0] != EMPTY).sum(1))[-500:]
     code, rng = programs[0][largest], np.random.default_rng(0)
     splice = jax.jit(lambda *a: spliced((a[0], a[1]), a[2], (a[3], a[4]), a[5], 99))
@@ -154,15 +154,15 @@ def test_splicing_is_cutting_and_pasting(programs: Any):
     assert 0 < kept < 200
 
 
-def test_text_and_back(programs: Any):
+def test_programs_survive_a_round_trip_through_text(programs: Any):
     for code, value in zip(*(rows[:1000] for rows in programs), strict=True):
         again = to_arrays(to_text(code, value, KNOWN), KNOWN, NODES, "x")
         assert np.array_equal(again[0], code)
         assert np.array_equal(again[1], value)
 
 
-def test_a_simplified_program_is_shorter_and_does_the_same(programs: Any):
-    """Within 1e-4 of the larger of 1 and the value, but for 1 in 500."""
+def test_a_simplified_program_is_shorter_with_the_same_value(programs: Any):
+    """Within 1e-4 of the larger of 1 and the value, for all but 1 in 500."""
     seen, apart, before, after = np.random.default_rng(3).normal(size=(3, len(KNOWN))), [], 0, 0
     for code, value in zip(*(rows[:2000] for rows in programs), strict=True):
         long = nested(code, value, KNOWN)
@@ -189,12 +189,12 @@ def test_a_simplified_program_is_shorter_and_does_the_same(programs: Any):
         (("min", "a1", "a1"), "a1"),
     ],
 )
-def test_what_makes_no_difference_goes(long: Any, short: Any):
+def test_simplification_removes_neutral_terms(long: Any, short: Any):
     assert simplified(long) == short
 
 
 def deaps() -> gp.PrimitiveSet:
-    """The same functions in DEAP, with nothing of ours."""
+    """The same functions in DEAP, independent of the package."""
     known = gp.PrimitiveSet("MAIN", len(KNOWN), prefix="a")
 
     def over(a: float, b: float) -> float:
@@ -230,16 +230,16 @@ def in_deap(code: np.ndarray, value: np.ndarray, known: gp.PrimitiveSet) -> gp.P
         if number == EMPTY:
             break
         if number == CONSTANT:
-            # As the text says it: the shortest that is this number in single precision.
+            # As in the text: the shortest number with this value in single precision.
             nodes.append(gp.Terminal(float(str(np.float32(constant))), False, object))
         else:
             nodes.append(functions[number] if number < FIRST_ADDED else arguments[number - 64])
     return gp.PrimitiveTree(nodes)
 
 
-def test_ten_thousand_programs_give_what_a_plain_reading_and_deap_give(programs: Any):
-    """Within 1e-4 of the larger of 1 and the value, but for 1 in 1,000, which single precision
-    leads to the other side of a zero.
+def test_ten_thousand_programs_match_a_plain_parser_and_deap(programs: Any):
+    """Within 1e-4 of the larger of 1 and the value, for all but 1 in 1,000: there single precision
+    ends on the other side of a zero.
     """
     code, value = programs
     seen = np.random.default_rng(0).normal(size=(MANY, len(KNOWN))).astype(np.float32)
@@ -258,8 +258,8 @@ def test_ten_thousand_programs_give_what_a_plain_reading_and_deap_give(programs:
     assert apart.mean() < 1e-3
 
 
-def test_the_evaluator_does_not_care_for_its_neighbours(programs: Any):
-    """One alone, as the examiner has a user's code, and among others of other lengths."""
+def test_a_programs_value_does_not_depend_on_its_batch(programs: Any):
+    """One program alone, as in the reference simulator, and in a batch with other lengths."""
     code, value = (jnp.asarray(rows[:16]) for rows in programs)
     seen = jnp.asarray(np.random.default_rng(1).normal(size=(16, len(KNOWN))), jnp.float32)
     plan = jax.jit(lambda *rows: listed(Trees(*rows), WORDS))
@@ -269,8 +269,10 @@ def test_the_evaluator_does_not_care_for_its_neighbours(programs: Any):
     np.testing.assert_allclose(np.stack(alone), together, rtol=1e-6, atol=1e-6)
 
 
-def test_the_first_programs_are_shaped_as_deaps(as_shipped: None):
-    """Ramped half-and-half of depths 2 to 5: mean size and depth within 4 %, and their spread."""
+def test_initial_programs_have_the_shape_of_deaps(as_shipped: None):
+    """Ramped half-and-half with depths 2 to 5: mean size and depth within 6 %, their spread
+    within 10 %.
+    """
     known = deaps()
     known.addEphemeralConstant("ball", partial(np.random.default_rng(0).uniform, -1, 1))
     theirs = [gp.PrimitiveTree(gp.genHalfAndHalf(known, 2, 5)) for _ in range(2000)]
@@ -288,8 +290,8 @@ def test_the_first_programs_are_shaped_as_deaps(as_shipped: None):
     assert (ends == CONSTANT).mean() == pytest.approx(1 / (len(KNOWN) + 1), abs=0.01)
 
 
-def test_crossing_prefers_functions():
-    """Nine points of ten are at a function where there is one; DEAP and Koza do likewise."""
+def test_crossover_prefers_functions():
+    """Nine of ten crossover points are functions where there are any, as in DEAP and Koza."""
     from mjxgait.controllers.expressions.operators import chosen_node
 
     code = to_arrays("(+ (* a0 a1) a2)", KNOWN, NODES, "x")[0]
@@ -301,7 +303,7 @@ def test_crossing_prefers_functions():
     assert shares[[2, 3, 4]] == pytest.approx([0.1 / 3] * 3, abs=0.015)
 
 
-def test_each_mutation_does_its_own():
+def test_each_mutation_changes_what_its_name_says():
     tree = to_arrays("(+ (* a0 0.5) (ifltz a1 a2 a3))", KNOWN, NODES, "x")
     keys = jax.random.split(key_of(0), 256)
 
@@ -319,8 +321,8 @@ def test_each_mutation_does_its_own():
     assert all(text.count("(") == 4 for text in all_of("nudge"))
 
 
-def test_a_nudge_changes_little_and_often_very_little():
-    """Of a single sense: `a0` and something, or times something near 1."""
+def test_a_nudge_changes_a_program_little():
+    """Nudges of one observation: `a0` plus a small number, or times a number near 1."""
     tree = to_arrays("a0", KNOWN, NODES, "x")
     keys = jax.random.split(key_of(0), 1000)
 
@@ -330,11 +332,11 @@ def test_a_nudge_changes_little_and_often_very_little():
     assert 0.4 < sums.mean() < 0.6
     by = abs(np.where(sums, value[:, 2], value[:, 2] - 1.0))
     assert by.max() < 5 * 0.2
-    # Half of all are below a tenth of the largest standard deviation.
+    # Half of all changes are below a tenth of the largest standard deviation.
     assert 0.005 < np.median(by) < 0.02
 
 
-def test_a_node_costs_what_the_settings_say():
+def test_each_node_costs_the_parsimony_setting():
     texts = [["a0", "(+ a0 0.5)"], ["(+ a0 (* a1 a2))", "0.5"]]
     arrays = [[to_arrays(text, KNOWN, NODES, "x") for text in joints] for joints in texts]
     code, value = (jnp.array([[pair[i] for pair in joints] for joints in arrays]) for i in (0, 1))
@@ -360,7 +362,7 @@ def test_a_node_costs_what_the_settings_say():
         ("(+ a0 " * 5000 + "a1" + ")" * 5000, "10,001 nodes; an expression may have 64"),
     ],
 )
-def test_a_mistake_in_an_expression_is_one_sentence(text: str, words: str):
+def test_a_mistake_in_an_expression_is_reported_in_one_sentence(text: str, words: str):
     with pytest.raises(UserError, match="expression of joint") as told:
         to_arrays(text, KNOWN, NODES, 'expression of joint "knee"')
     assert words in str(told.value)

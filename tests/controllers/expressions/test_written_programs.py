@@ -1,4 +1,4 @@
-"""Programs that were written by hand: read, begun with, examined."""
+"""Programs written by hand: parsing, initial population, and certification."""
 
 import dataclasses
 import json
@@ -24,10 +24,9 @@ from mjxgait.plugins.registry import build_config
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.folder import METRICS, read_metrics
 
-# The program of the lamp that Gritz & Hahn printed, as the transcript of the slides has it: line by
-# line, but for what the transcript lost. It has neither + nor * nor %, so those are ours: each
-# stands where a function is missing there. So is the parenthesis before the last `ifltz` of the
-# elbow, and the `*` in place of a "0" in front of "s0 vx".
+# The program that Gritz & Hahn printed for the lamp, from the transcript of the slides, line by
+# line. The transcript lost every +, * and %, so one of them fills each missing function. Also
+# added: the parenthesis before the last `ifltz` of the elbow, and the `*` for a "0" before "s0 vx".
 SLIDES = """\
 (list (- (ifltz a0 pz a2) (% a1 t))
 (ifltz (- (- (ifltz a0 pz a2) (% a1 t)) (ifltz
@@ -52,15 +51,15 @@ def limits(luxo: Creature) -> Vocabulary:
 
 
 def read(text: str, luxo: Creature, limits: Vocabulary) -> list[str]:
-    """The programs of a text, as the settings of a run hold them."""
+    """The programs of a text, as stored in a run's settings."""
     programs = read_programs(text, luxo.joints.names, limits, "f.txt")
     return [program_text(luxo, program) for program in programs]
 
 
-# Reading
+# Parsing
 
 
-def test_the_program_of_the_slides_can_be_entered(luxo: Creature, limits: Vocabulary):
+def test_the_program_of_the_slides_is_parsed(luxo: Creature, limits: Vocabulary):
     [found] = read(SLIDES, luxo, limits)
     assert found == " ".join(SLIDES.split()).replace("%", "/").replace(" )", ")")
     [(code, value)] = read_programs(SLIDES, luxo.joints.names, limits, "f.txt")
@@ -68,7 +67,7 @@ def test_the_program_of_the_slides_can_be_entered(luxo: Creature, limits: Vocabu
     assert np.float32(-28.43282) in value[2]
 
 
-def test_a_program_may_be_one_line_per_joint(luxo: Creature, limits: Vocabulary):
+def test_a_program_may_have_one_line_per_joint(luxo: Creature, limits: Vocabulary):
     text = """
     # a comment, and the joints in any order
     neck = (* 2 ; here too
@@ -80,15 +79,15 @@ def test_a_program_may_be_one_line_per_joint(luxo: Creature, limits: Vocabulary)
     assert read(text, luxo, limits) == ["(list 0.5 a0 (* 2 a1))", "(list 1 2 (/ a0 a1))"]
 
 
-def test_what_is_kept_of_a_program_is_the_same_program(luxo: Creature, limits: Vocabulary):
+def test_a_stored_program_parses_to_the_same_arrays(luxo: Creature, limits: Vocabulary):
     [first] = read_programs(SLIDES, luxo.joints.names, limits, "f.txt")
     [again] = read_programs(program_text(luxo, first), luxo.joints.names, limits, "f.txt")
     for one, other in zip(first, again, strict=True):
         np.testing.assert_array_equal(one, other)
 
 
-def test_many_functions_side_by_side_can_be_read(luxo: Creature, limits: Vocabulary):
-    """511 of them: only those within each other are read by recursion."""
+def test_many_functions_side_by_side_can_be_parsed(luxo: Creature, limits: Vocabulary):
+    """511 functions: recursion depth grows only with nesting."""
     text = "a0"
     for _ in range(9):
         text = f"(+ {text} {text})"
@@ -114,7 +113,7 @@ MISTAKES = [
     ("(list 1 2\n(plus a0 1))", 'line 2: there is no function "plus"'),
     ("(list 1 2 a9)", '"a9" is neither a sense nor a number'),
     ("(list 1 2 b0)", '"b0" is neither a sense nor a number'),
-    # As the transcript of the slides has it, without its operators.
+    # From the transcript of the slides, without its operators.
     ("(list (- (ifltz a0 pz a2) ( a1 t)) 1 2)", '"a1" stands where a function must'),
     ("(list 1 2\n" + "(+ a0 " * 40 + "1" + ")" * 41, "line 2: 81 nodes; an expression may have 64"),
     ("(list 1 2\n" + "(abs " * 12 + "1" + ")" * 13, "line 2: more than 9 functions within"),
@@ -122,14 +121,16 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("text", "words"), MISTAKES)
-def test_a_mistake_names_file_and_line(luxo: Creature, limits: Vocabulary, text: str, words: str):
+def test_a_mistake_is_reported_with_file_and_line(
+    luxo: Creature, limits: Vocabulary, text: str, words: str
+):
     with pytest.raises(UserError) as told:
         read(text, luxo, dataclasses.replace(limits, depth=9))
     assert str(told.value).startswith("f.txt")
     assert words in str(told.value)
 
 
-# To begin with
+# Initial population
 
 
 def options(luxo: Creature, **tables: dict) -> dict:
@@ -137,7 +138,7 @@ def options(luxo: Creature, **tables: dict) -> dict:
     return usual | {name: {**usual[name], **table} for name, table in tables.items()}
 
 
-def test_what_the_settings_do_not_allow_says_how_to_allow_it(luxo: Creature, tmp_path: Path):
+def test_a_disallowed_symbol_error_says_how_to_allow_it(luxo: Creature, tmp_path: Path):
     file, config = tmp_path / "p.txt", build_config(options(luxo), "test")
     for text, words in (
         (SLIDES, 'line 1: "t" is not among controller.senses; add it: --controller.senses '),
@@ -154,7 +155,7 @@ def test_what_the_settings_do_not_allow_says_how_to_allow_it(luxo: Creature, tmp
     assert len(with_expressions(luxo, allowed, file).controller.expressions) == 1
 
 
-def test_the_first_generation_begins_with_the_programs(luxo: Creature, tmp_path: Path):
+def test_the_first_generation_starts_with_the_programs(luxo: Creature, tmp_path: Path):
     file = tmp_path / "p.txt"
     file.write_text("(list 0.25 a0 (* a1 2))\n(list 1 2 3)")
     small = {"population": 6, "initial_choice": 1}
@@ -166,15 +167,13 @@ def test_the_first_generation_begins_with_the_programs(luxo: Creature, tmp_path:
         for i in range(2)
     ]
     assert texts == ["(list 0.25 a0 (* a1 2))", "(list 1 2 3)"]
-    # All others are those that would have been drawn anyway.
+    # All other programs are drawn as without given ones.
     np.testing.assert_array_equal(first.code[2:], plain.code[2:])
     np.testing.assert_array_equal(first.value[2:], plain.value[2:])
     assert (np.asarray(first.code[:2]) != np.asarray(plain.code[:2])).any()
 
 
-def test_where_bodies_evolve_written_programs_begin_on_the_creatures_own(
-    luxo: Creature, tmp_path: Path
-):
+def test_written_programs_start_on_the_unscaled_body(luxo: Creature, tmp_path: Path):
     file = tmp_path / "p.txt"
     file.write_text("(list 0.25 a0 (* a1 2))")
     small = {"population": 4, "initial_choice": 1, "body": 1.2}
@@ -187,7 +186,7 @@ def test_where_bodies_evolve_written_programs_begin_on_the_creatures_own(
 
 
 def trained(out: Path, file: Path, *more: object, generations: int = 1) -> tuple[object, ...]:
-    """The command that evolves a stool from the programs of a file."""
+    """The command that trains a stool from the programs of a file."""
     settings = out.parent / "small.toml"
     settings.write_text(TABLES)
     begin = ("train", "--env", STOOL, "--controller", "program", "--expressions", file)
@@ -201,7 +200,7 @@ FOUR = "(list 0.1 (* 0.3 (- 0 t)) (% a0 2) 0.2)\n"
 def test_a_run_holds_its_programs_and_resumes_without_the_file(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ):
-    """All places of the first generation are given ones, and none is lost before it is judged."""
+    """Given programs fill the first generation; none is lost before its evaluation."""
     file = tmp_path / "mine.txt"
     texts = [f"(list 0.1 0.{i} (/ a0 2) (* t 0.{i}))" for i in range(1, 9)]
     file.write_text("\n".join(texts).replace("/", "%"))
@@ -237,7 +236,7 @@ def test_a_run_holds_its_programs_and_resumes_without_the_file(
         (FOUR.encode(), ("--controller.depth", "1"), "more than 1 functions within each other"),
     ],
 )
-def test_a_mistake_is_told_before_anything_is_written(
+def test_a_mistake_is_reported_before_anything_is_written(
     content: bytes | None, more: tuple, words: str, tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     file, out = tmp_path / "mine.txt", tmp_path / "run"
@@ -251,9 +250,7 @@ def test_a_mistake_is_told_before_anything_is_written(
     assert not out.exists()
 
 
-def test_programs_are_for_the_controller_of_expressions(
-    tmp_path: Path, capsys: pytest.CaptureFixture
-):
+def test_programs_require_the_program_controller(tmp_path: Path, capsys: pytest.CaptureFixture):
     file, out = tmp_path / "mine.txt", tmp_path / "run"
     file.write_text(FOUR)
     command = ("train", "--env", STOOL, "--expressions", file, "--out", out)
@@ -261,7 +258,7 @@ def test_programs_are_for_the_controller_of_expressions(
     assert not out.exists()
 
 
-def test_programs_of_a_settings_file_are_checked_too(tmp_path: Path, capsys: pytest.CaptureFixture):
+def test_programs_in_a_settings_file_are_checked_too(tmp_path: Path, capsys: pytest.CaptureFixture):
     settings = tmp_path / "mine.toml"
     settings.write_text('[use]\ncontroller = "program"\n[controller]\nexpressions = ["(list 1)"]\n')
     out = tmp_path / "run"
@@ -271,10 +268,10 @@ def test_programs_of_a_settings_file_are_checked_too(tmp_path: Path, capsys: pyt
     assert not out.exists()
 
 
-# Examined
+# Certification
 
 
-def test_a_program_is_examined_without_a_run(tmp_path: Path, capsys: pytest.CaptureFixture):
+def test_a_program_is_certified_without_a_run(tmp_path: Path, capsys: pytest.CaptureFixture):
     file, short, out = tmp_path / "p.txt", tmp_path / "short.toml", tmp_path / "c.json"
     file.write_text(SLIDES)
     short.write_text(SHORT + "[hop]\nstay = 1.0\n")
@@ -291,8 +288,8 @@ def test_a_program_is_examined_without_a_run(tmp_path: Path, capsys: pytest.Capt
     assert "exists already" in again
 
 
-def test_a_program_that_passes_ends_with_0(tmp_path: Path, capsys: pytest.CaptureFixture):
-    """A lamp that stands, where nothing is demanded of it but that: so it passes by other rules."""
+def test_a_passing_program_exits_with_0(tmp_path: Path, capsys: pytest.CaptureFixture):
+    """A lamp that only has to stand; with changed criteria it passes by other rules."""
     file, short = tmp_path / "p.txt", tmp_path / "short.toml"
     file.write_text("(list 0 0 0)")
     short.write_text(SHORT + "[hop]\nstay = 1.0\nnear = 2.0\n")
@@ -300,8 +297,8 @@ def test_a_program_that_passes_ends_with_0(tmp_path: Path, capsys: pytest.Captur
     assert "it passes by other rules" in said_by(capsys, *command, code=0)
 
 
-def test_an_examined_program_is_who_a_run_would_have_made_of_it(luxo: Creature, tmp_path: Path):
-    """The same fingerprint, so the same starts and goals: as a champion of a run of the defaults."""
+def test_a_written_champion_has_the_fingerprint_of_a_runs(luxo: Creature, tmp_path: Path):
+    """The same fingerprint gives the same starts and goals as a champion of a default run."""
     file = tmp_path / "p.txt"
     file.write_text("(list 0 (+ a0 0) 1)")
     config = build_config(options(luxo), "test")
@@ -323,7 +320,7 @@ def test_an_examined_program_is_who_a_run_would_have_made_of_it(luxo: Creature, 
         (("--env", "luxo", "--expressions", "FILE", "--task", "swim"), "only bodies that grow"),
     ],
 )
-def test_what_certify_cannot_do_is_one_sentence(
+def test_unusable_certify_options_are_reported_in_one_sentence(
     arguments: tuple, words: str, tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     for name, text in (("FILE", "(list 1 2 3)"), ("TWO", "(list 1 2 3) (list 1 2 3)")):

@@ -49,7 +49,7 @@ def sensed(
     offset: float = 0.0,
     spin: np.ndarray | None = None,
 ) -> dict[str, jax.Array]:
-    """What the controller reads."""
+    """Observations of the controller."""
     nothing = jnp.zeros(3)
     moment = Sensed(
         joint_pos=jnp.asarray(joints, jnp.float32),
@@ -87,7 +87,7 @@ def tuning(**genes: float) -> jax.Array:
     return jnp.array([values[name] for name in TUNING])
 
 
-def test_the_cycle_is_exact_at_the_key_poses_and_their_mirror_images(shipped: Creature):
+def test_the_cycle_meets_key_poses_and_mirror_images_exactly(shipped: Creature):
     poses = random_poses(shipped)
     cycle = pose_cycle(shipped, jnp.asarray(poses))
     mirrored = (
@@ -100,7 +100,7 @@ def test_the_cycle_is_exact_at_the_key_poses_and_their_mirror_images(shipped: Cr
         assert np.allclose(interpolate(cycle, jnp.int32(i * 4), 4, 6), pose, atol=1e-6)
 
 
-def test_the_cycle_is_periodic_and_linear_between_neighbours(stool: Creature):
+def test_the_cycle_is_periodic_and_piecewise_linear(stool: Creature):
     cycle = pose_cycle(stool, jnp.asarray(random_poses(stool)))
     for s in range(24):
         a, f = s // 4, (s % 4) / 4
@@ -109,7 +109,7 @@ def test_the_cycle_is_periodic_and_linear_between_neighbours(stool: Creature):
         assert np.allclose(interpolate(cycle, jnp.int32(s + 24), 4, 6), expected, atol=1e-5)
 
 
-def test_an_unsymmetric_creature_is_not_mirrored(stool: Creature):
+def test_an_asymmetric_creature_is_not_mirrored(stool: Creature):
     lopsided = altered(stool, mirror={"symmetric": False})
     cycle = tracker(lopsided).prepare(
         Genome(jnp.asarray(random_poses(stool)), tuning()), settings()
@@ -131,7 +131,7 @@ def test_without_the_mirror_the_key_poses_are_the_whole_cycle(stool: Creature):
         )
 
 
-def test_a_blocked_creature_stays_and_a_following_one_moves_on(stool: Creature):
+def test_the_cycle_advances_only_when_joints_follow(stool: Creature):
     control = tracker(stool)
     cycle = control.prepare(
         Genome(jnp.asarray(random_poses(stool)), tuning(threshold=0.1)), settings()
@@ -142,7 +142,7 @@ def test_a_blocked_creature_stays_and_a_following_one_moves_on(stool: Creature):
     assert (int(blocked.position), int(moved.position)) == (0, 1)
 
 
-def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
+def test_the_clock_advances_even_when_joints_are_blocked(stool: Creature):
     control = tracker(stool)
     cycle = control.prepare(
         Genome(jnp.asarray(random_poses(stool)), tuning(period=0.8)), settings(advance="clock")
@@ -154,10 +154,10 @@ def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
 
 @pytest.mark.parametrize("period", [0.8, 0.4, 0.64, 1.0, 0.35, 0.7123, 1.9, 0.2, 0.006])
 @pytest.mark.parametrize(("interpolation", "mirror"), [(4, True), (7, False), (10, True)])
-def test_the_clock_is_the_examiners_on_every_step(
+def test_the_clock_matches_the_reference_controller_on_every_step(
     stool: Creature, period: float, interpolation: int, mirror: bool
 ):
-    """Eight seconds; where the step is a fraction of the period, as exact arithmetic has it."""
+    """Over 8 s; exact arithmetic too where the step is a fraction of the period."""
     rules = settings(interpolation=interpolation, advance="clock", mirror=mirror)
     poses, genes = random_poses(stool), tuning(period=period)
     control = tracker(stool)
@@ -221,8 +221,10 @@ def test_signs_of_the_corrections(
     [(PITCH_RATE, "balance_pitch", 0.3), (ROLL_RATE, "balance_roll", 0.2)],
     ids=["nose falling", "right side falling"],
 )
-def test_rates_of_the_trunk_are_its_own(stool: Creature, gene: int, weight: str, expected: float):
-    """About the trunk's axes, wherever it heads: it looks left, and turns in the world's frame."""
+def test_trunk_rates_are_about_the_trunks_own_axes(
+    stool: Creature, gene: int, weight: str, expected: float
+):
+    """The trunk faces left and also turns about the world's vertical."""
     creature = altered(stool, corrections={weight: np.array([1.0, 0, 0, 0])})
     left_turned = turned(2, np.pi / 2)
     moving = sensed(stool, stool.joints.stand, left_turned, spin=left_turned @ [0.2, 0.3, 5.0])
@@ -234,8 +236,8 @@ def test_rates_of_the_trunk_are_its_own(stool: Creature, gene: int, weight: str,
     assert np.allclose(change, [expected, 0, 0, 0], atol=1e-5)
 
 
-def test_steering_lengthens_the_stride(stool: Creature):
-    """What a pose is away from the standing one counts more on the outer side of the turn."""
+def test_steering_scales_the_stride(stool: Creature):
+    """Offsets from the standing pose grow on the outer side of the turn."""
     creature = altered(stool, corrections={"steer_stride": np.array([1.0, -1.0, 0.5, 0])})
     genes, pose = jnp.zeros(len(TUNING)).at[STEER].set(1.0), np.array([0.3, 0.3, -0.2, 0.1])
     target = jnp.asarray(stool.joints.stand + pose, jnp.float32)
@@ -243,8 +245,8 @@ def test_steering_lengthens_the_stride(stool: Creature):
     assert np.allclose(change, [0.06, -0.06, -0.02, 0], atol=1e-5)
 
 
-def test_who_is_to_turn_steers_more_as_the_examiner_has_it(stool: Creature):
-    """By the factor of the settings, bend and stride alike."""
+def test_steering_gain_matches_the_reference_controller(stool: Creature):
+    """The `steering` setting scales bend and stride alike."""
     weights = {"steer_bend": np.array([0.3, 0, 0, 0]), "steer_stride": np.array([0, -1.0, 0.5, 0])}
     creature, poses = altered(stool, corrections=weights), random_poses(stool)
     felt, genes = sensed(stool, stool.joints.stand, turned(2, 0.2)), tuning(steer=1.0)
@@ -263,7 +265,7 @@ def test_who_is_to_turn_steers_more_as_the_examiner_has_it(stool: Creature):
     np.testing.assert_allclose(targets[1], 2 * targets[0], atol=1e-5)
 
 
-def test_the_target_keeps_to_the_joint_ranges(stool: Creature):
+def test_targets_keep_to_the_joint_ranges(stool: Creature):
     narrow = altered(stool, joints={"low": np.full(4, -0.1), "high": np.full(4, 0.2)})
     control, poses = tracker(narrow), jnp.array([[3.0, -3.0, 0.1, 0.0]] * 2)
     cycle = control.prepare(Genome(poses, tuning()), settings(key_poses=2, mirror=False))

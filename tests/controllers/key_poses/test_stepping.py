@@ -1,4 +1,4 @@
-"""Stepping under a fall: what a body on two feet does that one on four need not."""
+"""Stepping corrections: how a biped places its feet under a fall."""
 
 import dataclasses
 import json
@@ -38,19 +38,19 @@ from mjxgait.types import Sensed
 
 STEP = 0.005
 ANKLES = 0.05
-"""m, how high feet are in a swing here: wholly off the floor."""
+"""m, height of the feet in a swing: clear of the floor."""
 
 
 @pytest.fixture(scope="module")
 def biped(tmp_path_factory: pytest.TempPathFactory) -> Creature:
-    """Left and right hips roll, then pitch; knees and ankles follow."""
+    """A biped; left and right hips roll, then pitch; knees and ankles follow."""
     file = tmp_path_factory.mktemp("biped") / "biped.urdf"
     file.write_text(BIPED, encoding="utf-8")
     return load_files(import_model(file, ImportChoices(apart=False)).files)
 
 
 def seen(creature: Creature, lifted: int | None = None, **changed: np.ndarray) -> Sensed:
-    """The standing creature, one foot in the air, and what else is said of it."""
+    """The standing creature, optionally with one foot lifted or other values changed."""
     data = mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(creature.model, data)
@@ -72,7 +72,7 @@ def seen(creature: Creature, lifted: int | None = None, **changed: np.ndarray) -
 
 
 def change(creature: Creature, moment: Sensed, **genes: float) -> dict[str, float]:
-    """By joint, rad that stepping adds to the target; only what is not zero."""
+    """Nonzero angles in rad that stepping adds to the target, by joint."""
     values = jnp.array([genes.get(name, 0.0) for name in STEPPING])
     felt = sense(creature, moment, jnp.zeros(()), PoseTracker(creature, STEP).reads)
     found = np.asarray(stepping(creature, values, felt))
@@ -81,7 +81,7 @@ def change(creature: Creature, moment: Sensed, **genes: float) -> dict[str, floa
 
 
 def way(creature: Creature, joint: str, angle: float) -> np.ndarray:
-    """[3] m that the left foot moves when a joint turns from the standing pose."""
+    """Displacement [3] in m of the left foot when a joint turns from the standing pose."""
     data, places = mujoco.MjData(creature.model), []
     for turned in (0.0, angle):
         data.qpos[:] = creature.stand_qpos
@@ -91,8 +91,8 @@ def way(creature: Creature, joint: str, angle: float) -> np.ndarray:
     return places[1] - places[0]
 
 
-def test_the_importer_gives_the_weights_to_what_takes_a_foot_ahead_and_aside(biped: Creature):
-    """A rad per hip height: of one rad a leg swings its foot about one hip height."""
+def test_import_weights_the_joints_that_move_a_foot_ahead_and_aside(biped: Creature):
+    """In rad per hip height: one rad swings the foot about one hip height."""
     weights = biped.corrections.stepping
     assert weights is not None
     names, hip = biped.joints.names, biped.frame.hip_height
@@ -109,8 +109,8 @@ def test_the_importer_gives_the_weights_to_what_takes_a_foot_ahead_and_aside(bip
         assert moved[axis] == pytest.approx(small * hip, rel=0.15)
 
 
-def test_a_biped_is_judged_on_more_starts_and_first_of_all_by_staying_up(biped: Creature):
-    """The import chooses the settings of its class and says so."""
+def test_a_biped_trains_on_more_trials_and_weights_staying_up(biped: Creature):
+    """The import chooses the settings of its class and documents them."""
     usual, own = Config(), resolve_config(biped.settings.train, biped.name)
     assert own.rollout.starts > usual.rollout.starts
     assert own.rollout.latency == 1
@@ -123,7 +123,7 @@ def test_a_biped_is_judged_on_more_starts_and_first_of_all_by_staying_up(biped: 
     assert "on one foot or two it falls unless it walks" in biped.files["creature.toml"]
 
 
-def test_a_quadruped_and_one_foot_behind_the_other_are_asked_for_what_is_usual(tmp_path: Path):
+def test_quadrupeds_and_in_line_feet_get_the_default_settings(tmp_path: Path):
     bound = BIPED.replace('xyz="0 0.09 0"', 'xyz="0.4 0 0"').replace(
         'xyz="0 -0.09 0"', 'xyz="-0.4 0 0"'
     )
@@ -145,7 +145,7 @@ def test_a_quadruped_and_one_foot_behind_the_other_are_asked_for_what_is_usual(t
         assert own.rollout.promote == usual.rollout.promote
 
 
-def test_bodies_without_weights_have_neither_the_genes_nor_the_senses():
+def test_bodies_without_weights_lack_step_genes_and_observations():
     stool = load_creature(STOOL)
     control = PoseTracker(stool, STEP)
     assert control.bounds(PoseConfig())[0].tuning.shape == (len(TUNING),)
@@ -161,8 +161,8 @@ def test_bodies_without_weights_have_neither_the_genes_nor_the_senses():
     ],
     ids=["ahead", "aside"],
 )
-def test_the_leg_that_swings_steps_to_where_the_trunk_goes(biped, genes, push, joint):
-    """And only that leg: the foot on the floor stays where it is."""
+def test_the_swing_leg_steps_where_the_trunk_moves(biped, genes, push, joint):
+    """Only the swing leg: the foot on the floor stays in place."""
     found = change(biped, seen(biped, lifted=0, trunk_vel=np.array(push)), **genes)
     assert list(found) == [f"left_{joint}"]
     speed = 1.0 / np.sqrt(9.81 * biped.frame.hip_height)
@@ -171,8 +171,8 @@ def test_the_leg_that_swings_steps_to_where_the_trunk_goes(biped, genes, push, j
     assert not change(biped, seen(biped, lifted=None, trunk_vel=np.array(push)), **genes)
 
 
-def test_it_steps_farther_the_farther_the_trunk_is_over_its_support(biped):
-    """The trunk is 5 cm ahead of where it stands over the right foot."""
+def test_steps_grow_with_the_trunks_offset_from_its_support(biped):
+    """The trunk is 5 cm ahead of its standing place over the right foot."""
     ahead = np.add(biped.frame.stand_pos, [0.05, 0, 0])
     found = change(biped, seen(biped, lifted=0, trunk_pos=ahead), step=1.0)
     assert list(found) == ["left_hip_pitch"]
@@ -188,8 +188,8 @@ def test_it_steps_farther_the_farther_the_trunk_is_over_its_support(biped):
     ],
     ids=["nose goes down", "right side goes down"],
 )
-def test_the_hip_that_stands_turns_the_trunk_back(biped, axis, genes, joint, away):
-    """Its leg goes back under a nose that goes down, so that the trunk, on that leg, comes up."""
+def test_the_stance_hip_turns_the_trunk_back(biped, axis, genes, joint, away):
+    """When the nose drops, the leg moves back under it, so the trunk on that leg comes up."""
     found = change(biped, seen(biped, lifted=1, trunk_angvel=np.array(axis)), **genes)
     assert list(found) == [f"left_{joint}"]
     assert way(biped, f"left_{joint}", found[f"left_{joint}"]) @ away > 0
@@ -197,7 +197,7 @@ def test_the_hip_that_stands_turns_the_trunk_back(biped, axis, genes, joint, awa
 
 @pytest.fixture(scope="module")
 def turner(tmp_path_factory: pytest.TempPathFactory) -> Creature:
-    """The biped whose hips turn about the vertical, the left one about its axis upside down."""
+    """The biped with hips that turn about the vertical; the left axis points down."""
     text = BIPED
     for side, axis in (("left", "0 0 -1"), ("right", "0 0 1")):
         begin = text.index(f'<joint name="{side}_hip_roll"')
@@ -209,9 +209,9 @@ def turner(tmp_path_factory: pytest.TempPathFactory) -> Creature:
     return load_files(import_model(file, ImportChoices(apart=False)).files)
 
 
-def test_who_looks_beside_the_way_turns_on_the_leg_that_stands(turner: Creature):
-    """The nose is to the left: the trunk turns right over its right foot, and the left one is put down
-    turned to the right.
+def test_a_heading_error_turns_the_body_on_the_stance_leg(turner: Creature):
+    """The nose points left: the trunk turns right over its right foot; the left foot lands
+    turned right.
     """
     angle = 0.2
     rot = np.array(
@@ -229,11 +229,11 @@ def test_who_looks_beside_the_way_turns_on_the_leg_that_stands(turner: Creature)
         toes = data.body(f"{side}_foot").xmat.reshape(3, 3)[:, 0]
         turned[side] = np.arctan2(toes[1], toes[0])
     assert np.abs(list(found.values())) == pytest.approx([angle] * 2, rel=1e-4)
-    # The trunk stands tipped a little, so that its hips' axes are not quite upright.
+    # The trunk stands slightly tipped, so the hip axes are not quite upright.
     assert turned == pytest.approx({"right": angle, "left": -angle}, rel=0.2)
 
 
-def test_no_step_is_larger_than_a_correction_may_be(biped):
+def test_steps_keep_to_the_correction_limit(biped):
     fast = seen(biped, lifted=0, trunk_vel=np.array([50.0, 0, 0]))
     weights = biped.corrections.stepping
     most = 0.5 * np.abs(weights.ahead).max()
@@ -241,8 +241,8 @@ def test_no_step_is_larger_than_a_correction_may_be(biped):
     assert abs(found["left_hip_pitch"]) == pytest.approx(most, rel=1e-5)
 
 
-def test_the_examiner_steps_as_evolution_does(biped):
-    """Two implementations, on moments of all kinds: feet up and down, tipped, turned and fast."""
+def test_the_reference_controller_steps_the_same(biped):
+    """Two implementations agree in many moments: feet up and down, tipped, turned and fast."""
     rng = np.random.default_rng(0)
     reads = PoseTracker(biped, STEP).reads
     genes = {name: float(rng.uniform(0, 1)) for name in STEPPING}
@@ -279,8 +279,8 @@ def test_the_examiner_steps_as_evolution_does(biped):
 
 
 @pytest.mark.parametrize("begin", [0.0, 0.5])
-def test_the_cycle_grows_out_of_the_standing_pose(biped: Creature, begin: float):
-    """In evolution and in the examination; and with no beginning, all of it is there at once."""
+def test_the_cycle_fades_in_from_the_standing_pose(biped: Creature, begin: float):
+    """In evolution and in certification; with `begin` = 0 the full cycle applies at once."""
     stand = biped.joints.stand
     pose = np.clip(stand + 0.2, biped.joints.low, biped.joints.high)
     champion = pose_champion(
@@ -303,7 +303,7 @@ def test_the_cycle_grows_out_of_the_standing_pose(biped: Creature, begin: float)
 
 
 @pytest.mark.parametrize("told", ["to stop", "to change"])
-def test_who_is_told_something_later_begins_as_it_always_does(biped: Creature, told: str):
+def test_a_later_command_does_not_change_the_start(biped: Creature, told: str):
     pose = np.clip(biped.joints.stand + 0.2, biped.joints.low, biped.joints.high)
     champion = pose_champion(biped, np.stack([pose] * 2), {"begin": 0.5}, PoseConfig(mirror=False))
     usual, later, once = PoseReference(biped, champion, STEP), np.array([9.0]), np.ones(1)
@@ -320,7 +320,7 @@ def test_who_is_told_something_later_begins_as_it_always_does(biped: Creature, t
 
 
 @pytest.mark.parametrize("key", ["ahead", "aside", "turn"])
-def test_the_examiner_reads_the_weights_for_itself(biped: Creature, turner: Creature, key: str):
+def test_a_wrong_stepping_weight_is_rejected(biped: Creature, turner: Creature, key: str):
     creature = turner if key == "turn" else biped
     check_body(creature)
     weights = creature.corrections.stepping
@@ -329,8 +329,8 @@ def test_the_examiner_reads_the_weights_for_itself(biped: Creature, turner: Crea
         check_body(altered(creature, corrections={"stepping": wrong}))
 
 
-def test_a_champion_of_before_begins_at_once(biped: Creature, tmp_path: Path):
-    """And does not turn with its hips: its file has no such genes."""
+def test_an_old_champion_starts_without_the_newer_genes(biped: Creature, tmp_path: Path):
+    """Its file lacks `begin` and `turn`: no fade-in, and no turning at the hips."""
     genes = {"begin": 0.7, "turn": 0.2, "hold": 0.3}
     champion = pose_champion(biped, np.stack([biped.joints.stand] * 2), genes)
     file = tmp_path / "champion.json"
@@ -365,7 +365,7 @@ def as_examined(creature: Creature, moment: Sensed) -> State:
     )
 
 
-def test_a_joint_that_moves_no_foot_cannot_step(tmp_path: Path):
+def test_a_stepping_weight_needs_a_joint_that_moves_a_foot(tmp_path: Path):
     folder = tmp_path / "duck"
     folder.mkdir()
     shipped = Path(__file__).parents[3] / "envs" / "duck"

@@ -1,4 +1,4 @@
-"""What the tests of blocks share."""
+"""Helpers for the tests of modular bodies."""
 
 import dataclasses
 from typing import Any
@@ -19,28 +19,28 @@ from mjxgait.physics.batched_trees.tree import ModularSensed
 from mjxgait.types import Sensed
 
 CAPACITY, LANES = Capacity(), 96
-"""Of random bodies; with these numbers all tests share compiled programs."""
+"""Capacity and number of random bodies; with these, all tests share compiled programs."""
 _draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
 _embody = jax.jit(jax.vmap(lambda graph: body_of(graph, CAPACITY)))
 
 
 def random_graphs(seed: int) -> Graph:
-    """[LANES]."""
+    """Random graphs [LANES]."""
     return _draw(jax.random.split(key_of(seed), LANES))
 
 
 def bodies_of(graphs: Graph) -> Body:
-    """What graphs [LANES] grow into."""
+    """Bodies of graphs [LANES]."""
     return _embody(graphs)
 
 
 def one(tree: Any, place: int) -> Any:
-    """One of many, in NumPy."""
+    """One of many, as NumPy arrays."""
     return jax.tree.map(lambda leaf: np.asarray(leaf)[place], tree)
 
 
 def genome_of(graph: Graph) -> dict[str, np.ndarray]:
-    """A graph's arrays as a champion has them."""
+    """A graph's arrays under the names of a champion's genome."""
     names = [field.name for field in dataclasses.fields(graph)]
     return {f"graph.{name}": np.asarray(getattr(graph, name)) for name in names}
 

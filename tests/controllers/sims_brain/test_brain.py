@@ -1,4 +1,4 @@
-"""Brains: the arrays think what a plain network thinks, whatever the genes."""
+"""Brains as arrays give the same outputs as a plain network, for any genes."""
 
 from functools import cache, partial
 
@@ -32,7 +32,7 @@ FIRED = jax.jit(fired, static_argnums=3)
 
 
 @pytest.mark.parametrize("name", NEURONS)
-def test_a_neuron_is_the_function_of_its_name(name: str):
+def test_a_neuron_computes_the_function_of_its_name(name: str):
     rng = np.random.default_rng(0)
     inputs, memory = rng.normal(0, 3, (300, 3)).astype(np.float32), rng.uniform(0, 1, 300)
     inputs[:20, 1] = 0.0
@@ -43,7 +43,7 @@ def test_a_neuron_is_the_function_of_its_name(name: str):
     np.testing.assert_allclose(kept, remembered, atol=2e-4)
 
 
-def test_nothing_that_comes_in_makes_a_value_that_is_not_finite():
+def test_any_input_gives_a_finite_value():
     values = np.array([0.0, 1e-30, -1e-4, 3.0, -10.0, 1e8, -1e30], np.float32)
     inputs = np.stack(np.meshgrid(values, values, values), -1).reshape(-1, 3)
     for kind in range(len(NEURONS)):
@@ -54,8 +54,8 @@ def test_nothing_that_comes_in_makes_a_value_that_is_not_finite():
         assert np.isfinite(kept).all(), NEURONS[kind]
 
 
-def test_a_brain_thinks_as_its_twin_does():
-    """Where a threshold is met within rounding, the two may part: not more than a few do."""
+def test_a_brain_matches_its_reference_controller():
+    """The two may differ where a threshold is met within rounding, in fewer than 3 % of brains."""
 
     def make(key: jax.Array):
         genotype = KIN.create(key)
@@ -94,8 +94,8 @@ def test_a_brain_thinks_as_its_twin_does():
     assert np.mean(wrong > 1e-2) < 0.03
 
 
-def test_what_a_twin_keeps_of_two_kinds_is_kept_apart():
-    """The examiner writes into what it was given at first."""
+def test_the_reference_brains_values_and_memory_are_separate_arrays():
+    """The reference simulator writes into the initial arrays."""
     first = brain_of(one(some(), 0)).init(2)
     first["values"][:] = 1.0
     assert (first["memory"] == 0).all()
@@ -103,12 +103,12 @@ def test_what_a_twin_keeps_of_two_kinds_is_kept_apart():
 
 @cache
 def some() -> Genotype:
-    """Thirty drawn at random."""
+    """Thirty random genotypes."""
     return jax.vmap(KIN.create)(jax.random.split(key_of(11), 30))
 
 
 def brain_of(genotype: Genotype) -> BrainReference:
-    """Of the body that it grows into, without the arrays."""
+    """The reference brain for the body of a genotype, without the arrays."""
     genome = arrays_of(genotype)
     parts = grow(genome, CAPACITY.parts, CAPACITY.links)
     hinges = [(p, h) for p, part in enumerate(parts) for h in range(len(part.hinges))]
@@ -116,7 +116,7 @@ def brain_of(genotype: Genotype) -> BrainReference:
 
 
 def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainReference]:
-    """The links of all hinges, part by part, and the brain that moves them."""
+    """The links of all hinges, part by part, and the brain that drives them."""
     plain = brain_of(genotype)
     links = [
         int(np.flatnonzero((body.part == p) & (body.hinge == h) & (body.tree.moves > 0))[0])
@@ -126,7 +126,7 @@ def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainReference]:
 
 
 def pulled(brain: BrainReference, lit: bool) -> np.ndarray:
-    """Torques of some commands, under senses that are always the same. lit: with a light."""
+    """Torques of four commands under fixed random observations. lit: with a light."""
     rng, memory, torques = np.random.default_rng(7), brain.init(3), []
     for _ in range(4):
         senses = {
@@ -140,8 +140,8 @@ def pulled(brain: BrainReference, lit: bool) -> np.ndarray:
 
 
 @pytest.mark.parametrize("lit", [True, False])
-def test_what_a_picture_of_a_brain_leaves_out_moves_nothing(lit: bool):
-    """And what it shows is all that it says: a neuron's inputs are wires, numbers, or not read."""
+def test_what_a_drawn_brain_leaves_out_has_no_effect(lit: bool):
+    """What it shows is complete: a neuron's inputs are wires or numbers, or have no effect."""
     rng, moving, left_out = np.random.default_rng(12), 0, 0
     for brain in [found for found in (brain_of(one(some(), i)) for i in range(30)) if found.hinges]:
         before, network = pulled(brain, lit), network_of(brain, lit)
@@ -152,7 +152,7 @@ def test_what_a_picture_of_a_brain_leaves_out_moves_nothing(lit: bool):
             assert lit or not any("light" in cell.label for cell in network.cells.values())
         np.testing.assert_array_equal(pulled(brain, lit), before)
         for wire in network.wires:
-            # One wire farther from the hinges at most; nearer where a hinge's neuron feeds others.
+            # At most one wire farther from the hinges; nearer where a hinge's neuron feeds others.
             assert network.cells[wire.source].depth <= network.cells[wire.target].depth + 1
         moving += bool(before.any())
     assert moving > 10
@@ -160,7 +160,7 @@ def test_what_a_picture_of_a_brain_leaves_out_moves_nothing(lit: bool):
 
 
 def test_a_brain_is_drawn_by_parts():
-    """A wave that drives a hinge, and the other hinge of the same joint, which nothing drives."""
+    """A wave drives one hinge; nothing drives the other hinge of the same joint."""
     brain = brain_of(one(some(), 0))
     wave = brain.place[0, 0]
     brain.alike = {"oscillate-wave": np.arange(len(brain.place))}
@@ -173,8 +173,8 @@ def test_a_brain_is_drawn_by_parts():
     assert said == ["part 0", "none 0", "none 1 = 0", "oscillate-wave(0.25, ·)", "1.00", "-2.00"]
 
 
-def test_a_mirror_image_pulls_the_other_way():
-    """The two of a pair sense and do the same, seen in a mirror: their torques mirror each other."""
+def test_mirrored_limbs_have_mirrored_torques():
+    """Both limbs of a pair have mirrored observations and the same neurons."""
     from controllers.sims_brain.test_growth import moving, star
 
     @jax.jit

@@ -1,4 +1,4 @@
-"""A grown body is a creature like any other: two files that load, and stand on the ground."""
+"""A grown body is an ordinary creature: its two files load, and it stands on the ground."""
 
 import mujoco
 import numpy as np
@@ -48,14 +48,14 @@ def test_grown_bodies_are_creatures(grown_parts: list):
 
 
 @pytest.mark.parametrize("step", [0.005, 0.01])
-def test_a_touch_is_as_hard_as_the_step_allows(grown_parts: list, step: float):
+def test_contacts_are_as_stiff_as_the_time_step_allows(grown_parts: list, step: float):
     parts = next(p for p in grown_parts if sum(len(part.hinges) for part in p) > 3)
     model = load_files(body_files(parts, "grown", step, 9.81, 0.9, "on land")).model
     assert model.opt.timestep == step
     assert np.allclose(model.geom_solref, [2 * step, 1.0])
 
 
-def test_nothing_touches_the_floor_of_a_swimmer(grown_parts: list):
+def test_a_swimmer_has_no_contact_with_the_floor(grown_parts: list):
     parts = next(p for p in grown_parts if sum(len(part.hinges) for part in p) > 3)
     creature = load_files(body_files(parts, "swimmer", 0.005, 0.0, None, "in water"))
     data = mujoco.MjData(creature.model)
@@ -67,7 +67,7 @@ def test_nothing_touches_the_floor_of_a_swimmer(grown_parts: list):
 
 
 def test_blocks_of_a_grown_body_collide(grown_parts: list):
-    """All that no joint joins, in whatever pose: MuJoCo itself keeps them apart."""
+    """MuJoCo keeps all blocks without a common joint apart, in any pose."""
     rng, met = np.random.default_rng(0), 0
     for parts in (p for p in grown_parts if sum(len(part.hinges) for part in p) > 3):
         creature = load_files(body_files(parts, "grown", 0.01, 9.81, 0.9, "on land"))

@@ -1,4 +1,4 @@
-"""Variation of graphs is closed: whatever it makes is a graph within its ranges, and grows."""
+"""Variation is closed: every child is a graph within its ranges and grows into a body."""
 
 import dataclasses
 from collections.abc import Callable
@@ -40,7 +40,7 @@ def parents() -> tuple[Genotype, Genotype]:
 
 @cache
 def breeder(name: str) -> Callable[..., Genotype]:
-    """Compiled once for all children of a kind."""
+    """An operator, compiled once for all its children."""
     return jax.jit(jax.vmap(getattr(KIN, name)))
 
 
@@ -51,7 +51,7 @@ def children(name: str, parents: tuple[Genotype, Genotype], seed: int = 2) -> Ge
 
 @pytest.fixture(scope="module", params=BUSY)
 def bred(request: pytest.FixtureRequest, parents: tuple[Genotype, Genotype]) -> Genotype:
-    """Children of children of children, so that what goes wrong a little adds up."""
+    """Children of three generations, so that small errors add up."""
     pair = parents
     for seed in range(3):
         pair = children(request.param, pair, seed), children(request.param, pair[::-1], seed + 10)
@@ -80,7 +80,7 @@ def test_children_are_graphs_within_their_ranges(bred: Genotype):
         assert values.max() <= high + 1e-6
 
 
-def test_children_grow_and_are_not_all_the_same(bred: Genotype):
+def test_children_grow_into_different_bodies(bred: Genotype):
     parts = GROWN(bred.graph)
     count = np.asarray(parts.exists.sum(1))
     assert count.min() >= 1
@@ -94,7 +94,7 @@ def test_the_same_key_gives_the_same_child(parents: tuple[Genotype, Genotype]):
             np.testing.assert_array_equal(a, b)
 
 
-def test_crossing_over_moves_nodes_as_wholes(parents: tuple[Genotype, Genotype]):
+def test_crossover_keeps_nodes_whole(parents: tuple[Genotype, Genotype]):
     mother, father = (jax.tree.map(np.asarray, p) for p in parents)
     child = jax.tree.map(np.asarray, children("cross", parents))
     came = {}
@@ -111,13 +111,13 @@ def test_crossing_over_moves_nodes_as_wholes(parents: tuple[Genotype, Genotype])
     np.testing.assert_array_equal(child.centre.kind, mother.centre.kind)
 
 
-def test_a_graft_hangs_the_others_root_on_ones_own_tree(parents: tuple[Genotype, Genotype]):
+def test_a_graft_attaches_the_fathers_root_to_the_mothers_graph(parents: tuple[Genotype, Genotype]):
     mother, father = parents
     child = children("graft", parents)
     before, after = np.asarray(ALIVE(mother.graph)), np.asarray(ALIVE(child.graph))
     room = ~before.all(1)
     half, his = np.asarray(child.graph.half), np.asarray(father.graph.half)
-    # The father's root takes the first node that was free, and is reached.
+    # The father's root takes the first free node, and is reached.
     first = np.argmax(~before, axis=1)
     rows = np.arange(COUNT)
     np.testing.assert_array_equal(half[rows, first][room], his[:, 0][room])
@@ -126,14 +126,14 @@ def test_a_graft_hangs_the_others_root_on_ones_own_tree(parents: tuple[Genotype,
     assert all(jax.tree.leaves(same)), "without room nothing is grafted"
 
 
-def test_what_is_grafted_is_connected_as_it_was(parents: tuple[Genotype, Genotype]):
-    """The father's nodes in their new places lead to his, and what found no room is not led to."""
+def test_grafted_nodes_keep_their_connections(parents: tuple[Genotype, Genotype]):
+    """The father's nodes keep their targets in new places; targets without a place are dropped."""
     mother, father = (jax.tree.map(np.asarray, p) for p in parents)
     child = jax.tree.map(np.asarray, children("graft", parents))
     free = ~np.asarray(ALIVE(mother.graph))
     led, dropped = 0, 0
     for row in range(COUNT):
-        # His first nodes take the free places in order.
+        # The father's first nodes take the free places in order.
         places = np.flatnonzero(free[row])
         mine, his = one(child.graph, row), one(father.graph, row)
         for node, place in enumerate(places):
@@ -146,7 +146,7 @@ def test_what_is_grafted_is_connected_as_it_was(parents: tuple[Genotype, Genotyp
 
 
 def changed(child: Genotype, parent: Genotype) -> np.ndarray:
-    """How many [COUNT] values of connected nodes differ."""
+    """Number [COUNT] of changed values of connected nodes."""
     alive = np.asarray(ALIVE(parent.graph))
     changes = np.zeros(COUNT)
     for name in ("graph", "nerves"):
@@ -162,29 +162,29 @@ def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
     keys = jax.random.split(key_of(3), COUNT)
     child = jax.jit(jax.vmap(calm.mutate))(keys, parents[0])
     changes = changed(child, parents[0])
-    # A kind that is drawn anew may be what it was.
+    # A kind that is drawn again may come out the same.
     assert 2.5 < changes.mean() < 4.2
     assert jnp.array_equal(child.graph.used, parents[0].graph.used)
 
 
-def test_of_mutations_with_strengths_of_their_own_most_are_mild_and_few_are_strong(
+def test_with_random_strengths_most_mutations_are_mild_and_few_strong(
     parents: tuple[Genotype, Genotype],
 ):
     rates = Rates(value=8.0, connection=0.8, node=0.0, strength=(1 / 16, 2.0))
     keys = jax.random.split(key_of(3), COUNT)
     child = jax.jit(jax.vmap(Kin(CAPACITY, ROOM, RANGES, rates).mutate))(keys, parents[0])
-    # Connections apart, which take values with them.
+    # Only children with unchanged connections: a connection takes values with it.
     same = np.asarray((child.graph.used == parents[0].graph.used).all((1, 2)))
     changes = changed(child, parents[0])[same]
     assert (changes <= 1).mean() > 0.3
     assert (changes >= 9).mean() > 0.03
-    # Of min(strength, 1), log-uniform between them, the mean is (1 - 1/16 + ln 2) / ln 32.
+    # The mean of min(strength, 1), log-uniform between them, is (1 - 1/16 + ln 2) / ln 32.
     assert 1 - same.mean() == pytest.approx(0.8 * 0.47, abs=0.05)
 
 
 @pytest.mark.thorough("a special case; test_a_mutation_changes_a_few_values has the usual numbers")
-def test_as_many_central_neurons_as_nodes_change_nothing_of_a_graphs_mutation():
-    """They do not grow, so they do not count among the values of which a few change."""
+def test_central_neurons_do_not_change_a_graphs_mutation():
+    """Central neurons do not grow, so they do not count among the values of which a few change."""
     graphs = []
     for central in (CAPACITY.nodes, CAPACITY.nodes + 1):
         kin = Kin(CAPACITY, NerveRoom(central=central), RANGES)
@@ -195,7 +195,7 @@ def test_as_many_central_neurons_as_nodes_change_nothing_of_a_graphs_mutation():
         np.testing.assert_array_equal(a, b)
 
 
-def test_nodes_and_connections_come_and_go(parents: tuple[Genotype, Genotype]):
+def test_mutation_adds_and_removes_nodes_and_connections(parents: tuple[Genotype, Genotype]):
     child = children("mutate", parents)
     used, before = (np.asarray(g.graph.used).sum((1, 2)) for g in (child, parents[0]))
     assert (used > before).mean() > 0.2
@@ -209,8 +209,8 @@ FREE = pytest.mark.thorough("other tests here have bodies that vary")
 
 
 @pytest.mark.parametrize("drawn", [True, pytest.param(False, marks=FREE)])
-def test_a_drawn_body_is_its_mothers(parents: tuple[Genotype, Genotype], drawn: bool):
-    """Whatever befalls the child, and its brain still varies."""
+def test_a_child_keeps_its_mothers_drawn_body(parents: tuple[Genotype, Genotype], drawn: bool):
+    """Under any operator; the brain still varies."""
     controller = Brains(0.01, BrainConfig())
     bred = controller.variation(BrainConfig(drawn=drawn), EvolutionConfig())
     keys = jax.random.split(key_of(3), 200)
@@ -222,7 +222,7 @@ def test_a_drawn_body_is_its_mothers(parents: tuple[Genotype, Genotype], drawn: 
         return bred.mutate(key, bred.cross(key, mother, father))
 
     def changed(part: str) -> float:
-        """The share of children of which this part is not quite their mother's."""
+        """Share of children in which this part differs from the mother's."""
         leaves = [jax.tree.leaves(getattr(each, part)) for each in (young, few[0])]
         pairs = [(np.asarray(a), np.asarray(b)) for a, b in zip(*leaves, strict=True)]
         return np.mean([any((a[i] != b[i]).any() for a, b in pairs) for i in range(200)])

@@ -1,4 +1,4 @@
-"""Graphs grow into bodies: as a plain list would, within their room, and mirror images are such."""
+"""Growth of graphs into bodies: against a plain list, within capacity, with mirror images."""
 
 import dataclasses
 import itertools
@@ -47,7 +47,7 @@ def parts(graphs: Graph) -> Parts:
     return jax.tree.map(np.asarray, GROW(graphs))
 
 
-def test_a_body_grows_as_a_plain_list_does(graphs: Graph, parts: Parts):
+def test_growth_matches_a_plain_list(graphs: Graph, parts: Parts):
     sizes = set()
     for place in range(COUNT):
         mine, genome = one(parts, place), genome_of(one(graphs, place))
@@ -68,7 +68,7 @@ def test_a_body_grows_as_a_plain_list_does(graphs: Graph, parts: Parts):
     assert {1, 2, 3, 4, 5, 6} < sizes
 
 
-def test_a_body_keeps_to_its_room(parts: Parts):
+def test_a_body_stays_within_capacity(parts: Parts):
     assert parts.exists.sum(1).max() <= CAPACITY.parts
     assert (parts.last * parts.exists).max() < CAPACITY.links
     rows = parts.turn[parts.exists]
@@ -88,7 +88,7 @@ def test_the_same_graph_grows_into_the_same_body():
 def star(
     mirror: int, recursion: int = 0, joint: str = "universal", terminal: bool = False
 ) -> Graph:
-    """A root with one kind of limb on its side, which may carry another of itself."""
+    """A root with one kind of limb on its side, which may repeat itself."""
     base = one(draw(1), 0)
     each = (CAPACITY.nodes, CAPACITY.connections)
     node, order = np.indices(each)
@@ -109,15 +109,16 @@ def star(
 
 
 @pytest.mark.parametrize(("recursion", "parts"), [(0, 2), (1, 3), (3, 5)])
-def test_a_node_follows_itself_as_often_as_it_may(recursion: int, parts: int):
+def test_a_node_repeats_up_to_its_recursion_limit(recursion: int, parts: int):
     found = grown(star(mirror=0, recursion=recursion, joint="twist"), CAPACITY)
     assert int(found.exists.sum()) == parts
     assert found.depth[:parts].tolist() == [0, 0, *range(1, recursion + 1)]
 
 
-def test_nothing_grows_where_there_is_a_block():
-    """A limb that turns back on itself would end up in the root; a pair that has no room on one
-    side has none."""
+def test_nothing_grows_into_an_existing_block():
+    """A limb that turns back would end inside the root. A pair without space on one side has no
+    limbs.
+    """
     back = star(mirror=0, recursion=1)
     back = dataclasses.replace(back, place=back.place.at[1, :, 0].set(-1.0))
     assert int(grown(back, CAPACITY).exists.sum()) == 2
@@ -128,8 +129,8 @@ def test_nothing_grows_where_there_is_a_block():
     assert int(grown(alone, CAPACITY).exists.sum()) == 2
 
 
-def test_blocks_are_apart_as_they_grew(graphs: Graph):
-    """In MuJoCo's own geometry: none but parent and child are nearer than they may."""
+def test_grown_blocks_are_apart(graphs: Graph):
+    """By MuJoCo's geometry: only parent and child are closer than the allowed gap."""
     seen = 0
     for place in range(200):
         parts = grow(genome_of(one(graphs, place)), CAPACITY.parts, CAPACITY.links)
@@ -147,7 +148,7 @@ def test_blocks_are_apart_as_they_grew(graphs: Graph):
     assert seen > 200
 
 
-def test_a_child_hangs_on_its_parents_surface(graphs: Graph):
+def test_a_child_is_attached_to_its_parents_surface(graphs: Graph):
     hanging = 0
     for place in range(100):
         parts = grow(genome_of(one(graphs, place)), CAPACITY.parts, CAPACITY.links)
@@ -159,20 +160,20 @@ def test_a_child_hangs_on_its_parents_surface(graphs: Graph):
     assert hanging > 50
 
 
-def test_what_is_terminal_grows_at_the_end_only():
-    """The limb's own connection leads to itself: at its end it may not follow itself any more."""
+def test_a_terminal_connection_grows_only_at_the_end():
+    """The limb's own connection leads to itself; at its end it may not repeat."""
     assert int(grown(star(mirror=0, recursion=2, terminal=True), CAPACITY).exists.sum()) == 2
 
 
 def test_a_pair_grows_together_or_not_at_all():
-    """Each limb has three hinges: eleven links have room for three limbs."""
+    """Each limb has three hinges: eleven links suffice for three limbs."""
     body = EMBODY(star(mirror=2, recursion=1, joint="spherical"))
     assert int(body.parts.exists.sum()) == 4
     pairs = grown(star(mirror=2), dataclasses.replace(CAPACITY, parts=2))
     assert int(pairs.exists.sum()) == 1
 
 
-def test_a_pair_is_the_mirror_image_of_each_other():
+def test_a_pair_of_limbs_is_mirrored():
     body = EMBODY(star(mirror=2, recursion=1, joint="universal"))
     places, axes = joints_in_the_world(body)
     copies = np.asarray(body.parts.copies)[np.asarray(body.part)]
@@ -180,13 +181,13 @@ def test_a_pair_is_the_mirror_image_of_each_other():
     assert len(left) == len(right) == 4
     flip, sign = np.array([1.0, -1.0, 1.0]), np.asarray(body.sign)[:, None]
     np.testing.assert_allclose(places[right], places[left] * flip, atol=1e-6)
-    # A turn is mirrored to the turn the other way about the axis's image.
+    # A mirrored rotation is the opposite rotation about the mirrored axis.
     np.testing.assert_allclose((sign * axes)[right], -(sign * axes)[left] * flip, atol=1e-6)
     assert np.asarray(body.strength)[left].tolist() == np.asarray(body.strength)[right].tolist()
 
 
-def test_what_has_no_hinge_starts_unbent():
-    """A start bends every hinge that there may be; what is rigid would stay bent for ever."""
+def test_rigid_joints_start_unbent():
+    """A start bends every possible hinge; a rigid joint would stay bent for ever."""
     nobody: Any = None
     weightless: Any = SimpleNamespace(rested=lambda tree, qpos: qpos)
     bent = jnp.full(7 + CAPACITY.links - 1, 0.3)

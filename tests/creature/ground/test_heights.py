@@ -1,4 +1,4 @@
-"""What is told of heights is told above the ground: who climbs has neither fallen nor jumped."""
+"""Heights are measured above the ground: climbing is neither a fall nor a jump."""
 
 import dataclasses
 
@@ -12,7 +12,7 @@ from mjxgait.types import Sensed
 
 
 def standing(creature: Creature, above: float, floor: float | None) -> Sensed:
-    """As it starts, but so many m higher."""
+    """The creature in its start pose, `above` m higher."""
     nothing, count = jnp.zeros(3), len(creature.joints.names)
     return Sensed(
         joint_pos=jnp.asarray(creature.joints.stand),
@@ -28,14 +28,14 @@ def standing(creature: Creature, above: float, floor: float | None) -> Sensed:
     )
 
 
-def test_height_counts_above_the_ground(stool: Creature):
+def test_termination_uses_the_height_above_the_ground(stool: Creature):
     ends = stool.settings.termination
     assert why_fallen(stool, ends, standing(stool, 2.0, 2.0)) == Reason.FINISHED
     assert why_fallen(stool, ends, standing(stool, 2.0, None)) == Reason.TOO_HIGH
     assert why_fallen(stool, ends, standing(stool, 2.0, 2.2)) == Reason.TOO_LOW
 
 
-def test_a_controller_may_read_it(stool: Creature):
+def test_the_trunk_height_observation_is_above_the_ground(stool: Creature):
     moment = standing(stool, 2.0, 1.9)
     found = sense(stool, moment, jnp.float32(0), ["trunk_height"])["trunk_height"]
     np.testing.assert_allclose(found, stool.frame.stand_height + 0.1, atol=1e-5)

@@ -1,4 +1,4 @@
-"""The ground as text: what is understood, and what is told where it is not."""
+"""The ground as text: what is accepted, and the errors for the rest."""
 
 import pytest
 
@@ -19,7 +19,7 @@ TEXTS = {
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_a_text_says_which_ground_and_back(text: str):
+def test_ground_texts_survive_a_round_trip(text: str):
     assert parse_ground(text) == TEXTS[text]
     assert str(TEXTS[text]) == text
 
@@ -39,15 +39,15 @@ def test_a_text_says_which_ground_and_back(text: str):
         "slope:0.1@3": "no seed",
     }.items(),
 )
-def test_a_mistake_names_the_key_and_what_is_allowed(text: str, told: str):
+def test_the_error_names_the_key_and_the_allowed_values(text: str, told: str):
     with pytest.raises(UserError) as error:
         build(Config, {"rollout": {"ground": text}}, "mine.toml")
     for part in ("mine.toml", "rollout.ground", text, told, "rough:S"):
         assert part in str(error.value)
 
 
-def test_only_the_kind_shapes_the_program():
-    """So that a study may set heights beside each other in one program."""
+def test_only_the_kind_of_ground_changes_the_program():
+    """So a study can compare heights in one program."""
 
     def shape(ground: str) -> object:
         config = build(Config, {"rollout": {"ground": ground}}, "test")

@@ -1,4 +1,4 @@
-"""The ground that the program computes: smooth, level at the start, and the examiner's own."""
+"""The ground in JAX: smooth, level at the start, and equal to the reference simulator's."""
 
 import dataclasses
 
@@ -37,7 +37,7 @@ TEXTS = (
 
 
 def drawn(creature: Creature, config: RolloutConfig) -> Starts:
-    """Compiled as a whole: its hundreds of operations would be compiled one by one."""
+    """Starts, compiled as a whole: otherwise hundreds of operations compile one by one."""
     return jax.jit(lambda key: draw_starts(key, creature, config))(key_of(0))
 
 
@@ -49,14 +49,14 @@ def laid(creature: Creature, text: str) -> Ground:
 
 
 def places(creature: Creature, reach: float, count: int = 400) -> np.ndarray:
-    """[2, count] m, at random within so many body lengths of the start."""
+    """Random places [2, count] in m, within `reach` body lengths of the start."""
     rng = np.random.default_rng(0)
     around = rng.uniform(-1, 1, (2, count)) * reach * creature.frame.body_length
     return around + creature.frame.stand_pos[:2, None]
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_the_examiner_has_the_same_ground_of_its_own(stool: Creature, text: str):
+def test_heights_match_the_reference_simulator(stool: Creature, text: str):
     x, y = places(stool, 30.0)
     theirs = terrain_of(stool.on(text))
     assert theirs is not None
@@ -65,8 +65,8 @@ def test_the_examiner_has_the_same_ground_of_its_own(stool: Creature, text: str)
     np.testing.assert_allclose(ours, theirs.height(x, y), atol=2e-5)
 
 
-def test_uneven_ground_is_rough_ground_on_slopes(stool: Creature):
-    """Each with the heights that the named ground of its kind has."""
+def test_uneven_ground_is_the_sum_of_slope_and_roughness(stool: Creature):
+    """Each with the heights of the named ground of its kind."""
     x, y = places(stool, 10.0)
     draws = named_draws(0)
     for slope, text in (((-0.2, 0.0), "slope:0.2:down"), ((0.0, 0.2), "slope:0.2:across")):
@@ -75,8 +75,8 @@ def test_uneven_ground_is_rough_ground_on_slopes(stool: Creature):
         np.testing.assert_allclose(both, sum(parts), atol=1e-5)
 
 
-def test_perturbed_starts_have_uneven_ground_of_their_own(stool: Creature):
-    """The nominal one has none, whatever the others have: no two the same, none too steep."""
+def test_perturbed_starts_have_their_own_uneven_ground(stool: Creature):
+    """The nominal start is always level. No two others are the same, none is too steep."""
     config = dataclasses.replace(small_config().rollout, starts=6, slope=10.0)
     ground = drawn(stool, config).ground
     assert ground is not None
@@ -88,7 +88,7 @@ def test_perturbed_starts_have_uneven_ground_of_their_own(stool: Creature):
     assert (np.abs(heights[1:]).max(1) > 0).all()
     steepest = np.tan(np.radians(10.0)) * 20 * stool.frame.body_length
     assert np.abs(heights).max() <= 1.05 * steepest
-    # Spread evenly: to no side do all of them rise or fall. Behind the start all is level.
+    # Slopes spread evenly: in no direction do all rise or all fall. Behind the start all is level.
     for direction in heights[1:, [0, 2, 3]].T:
         assert direction.min() < 0 < direction.max()
     rough = dataclasses.replace(config, slope=0.0, rough=0.1)
@@ -99,8 +99,8 @@ def test_perturbed_starts_have_uneven_ground_of_their_own(stool: Creature):
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_the_normal_is_that_of_the_heights(stool: Creature, text: str):
-    """Also where a creature starts askew."""
+def test_the_normal_matches_the_gradient_of_the_heights(stool: Creature, text: str):
+    """Also where a creature starts at an angle."""
     ground = dataclasses.replace(laid(stool, text), forward=jnp.float32([0.6, 0.8]))
     x, y = (jnp.asarray(p, jnp.float32) for p in places(stool, 6.0))
     gradient = jax.vmap(jax.grad(lambda at: height(ground, at[0], at[1])))(jnp.stack([x, y], 1))
@@ -111,19 +111,19 @@ def test_the_normal_is_that_of_the_heights(stool: Creature, text: str):
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_it_is_level_where_a_creature_starts(stool: Creature, text: str):
+def test_the_ground_is_level_at_the_start(stool: Creature, text: str):
     ground = laid(stool, text)
     x, y = places(stool, 0.7)
     np.testing.assert_array_equal(height(ground, x, y), 0.0)
     np.testing.assert_array_equal(normal(ground, x, y)[2], 1.0)
 
 
-def test_it_is_as_high_and_as_steep_as_asked(stool: Creature):
+def test_the_ground_is_as_high_and_as_steep_as_requested(stool: Creature):
     forward, left = start_place(stool).forward, np.array([0.0, 1.0])
     far = stool.frame.stand_pos[:2] + 10 * stool.frame.body_length * forward[:2]
 
     def rise(text: str, way: np.ndarray) -> float:
-        """Per metre."""
+        """Rise in m over the displacement `way`."""
         there, here = (height(laid(stool, text), *at) for at in (far + way, far))
         return float(there - here)
 
@@ -138,7 +138,7 @@ def test_it_is_as_high_and_as_steep_as_asked(stool: Creature):
         assert 0.08 * stool.frame.hip_height < highest <= 0.1 * stool.frame.hip_height
 
 
-def test_every_trial_has_ground_of_its_own_and_the_first_the_named_one(stool: Creature):
+def test_trials_have_their_own_ground_starting_with_the_named_one(stool: Creature):
     config = small_config(rollout={"ground": "rough:0.1@5", "starts": 3}).rollout
     ground = drawn(stool, config).ground
     x, y = places(stool, 20.0)
@@ -161,8 +161,8 @@ def test_other_draws_do_not_change_with_the_ground(stool: Creature):
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_a_sphere_is_as_far_away_as_the_nearest_point(stool: Creature, text: str):
-    """Against the nearest of many points of the examiner's ground."""
+def test_sphere_distance_is_to_the_nearest_ground_point(stool: Creature, text: str):
+    """Against the nearest of many points of the reference simulator's ground."""
     theirs = terrain_of(stool.on(text))
     assert theirs is not None
     radius, (x, y) = 0.03, places(stool, 6.0, 60)
@@ -171,7 +171,7 @@ def test_a_sphere_is_as_far_away_as_the_nearest_point(stool: Creature, text: str
     px, py = x + near[0][:, None], y + near[1][:, None]
     apart = np.sqrt((px - x) ** 2 + (py - y) ** 2 + (theirs.height(px, py) - z) ** 2).min(0)
     found = contact(laid(stool, text), x, y, z, radius)
-    # A step's edge is as sharp as the sphere: two looks do not quite find the nearest point.
+    # A step's edge is as sharp as the sphere: two iterations do not quite find the nearest point.
     tolerance = 2e-3 if "steps" in text else 5e-4
     np.testing.assert_allclose(found.distance, apart - radius, atol=tolerance)
     axes = jnp.stack([jnp.stack(axis) for axis in found[1:]])

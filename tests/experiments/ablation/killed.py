@@ -1,6 +1,6 @@
-"""A process that measures champions by 1 s of walking, and is killed once, as by a full memory.
+"""A process that measures champions for 1 s each and is killed once, as when memory runs out.
 
-A file of its own, since the processes that measure import it by its name.
+In its own file, because the measuring processes import it by name.
 """
 
 import os
@@ -20,7 +20,7 @@ JUDGE = rows._evaluate
 def evaluate(
     creature: Path, grounds: Sequence[str], examine: bool, champion: Path, finite: bool
 ) -> Evaluation:
-    """In place of `rows._evaluate`: killed once, after a result of another champion is on disk."""
+    """Stand-in for `rows._evaluate`: killed once, after another champion's result is on disk."""
     rows.SECONDS, study = 1.0, creature.parent
     killed = study.with_name(f"{study.name}-was-killed")
     if champion.name == LAST and not killed.exists():

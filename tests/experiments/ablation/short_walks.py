@@ -1,6 +1,6 @@
-"""The command, but champions are judged by 2 s of walking instead of 22.
+"""The command, with champions evaluated for 2 s instead of 22.
 
-A file of its own, since the processes that judge read it anew.
+In its own file, because the evaluating processes read it again.
 """
 
 from mjxgait.experiments.ablation import rows

@@ -1,6 +1,4 @@
-"""The command as a user runs it: a report with everything, rows that equal runs alone, kills
-that lose nothing.
-"""
+"""The command as a user runs it: complete report, rows equal to single runs, kills lose nothing."""
 
 import contextlib
 import io
@@ -65,7 +63,7 @@ def command(*arguments: object) -> list[str]:
 
 
 def mjxgait_of_its_own(*arguments: object, code: int = 0) -> str:
-    """What the command says in a process of its own."""
+    """Output of the command in its own process."""
     done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
@@ -73,7 +71,7 @@ def mjxgait_of_its_own(*arguments: object, code: int = 0) -> str:
 
 
 def ended(*arguments: object, code: int) -> tuple[str, str]:
-    """What the command says on its two streams in this process, where it ends with this code."""
+    """Standard output and error of the command in this process; it must end with this code."""
     out, err = io.StringIO(), io.StringIO()
     with (
         contextlib.redirect_stdout(out),
@@ -94,9 +92,9 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module", autouse=True)
 def cheap() -> Iterator[None]:
-    """In this process only evolution is compiled, once for all; one process measures 1 s of walking.
+    """Compile only evolution, once for all tests; measure 1 s of walking in one process.
 
-    `test_hyper` compiles whole runs side by side, and `test_cores` counts processes.
+    `test_hyper` compiles whole runs together, and `test_cores` counts processes.
     """
     programs = Programs()
     with pytest.MonkeyPatch.context() as patch:
@@ -109,15 +107,15 @@ def cheap() -> Iterator[None]:
 
 
 class Killed(BaseException):
-    """Nothing in the program catches it."""
+    """An exception that the program does not catch."""
 
 
 @pytest.fixture(scope="module")
 def finished(study: Path) -> tuple[Path, str]:
-    """Folder and report of a study that ended amid its runs, and was killed while it measured.
+    """Folder and report of a study that ended during its runs and was killed while measuring.
 
-    The first time between the log of a generation and its checkpoint. The second time as a system
-    kills that is out of memory: then it says so. Each time it goes on.
+    First between the log of a generation and its checkpoint, then as when memory runs out, which
+    it reports. It is resumed each time.
     """
     folder, keep = study.parent / "out", Checkpoints.keep
 
@@ -171,7 +169,7 @@ def test_the_report_holds_everything(finished: tuple[Path, str]):
 
 @pytest.fixture(scope="module")
 def killed_twice(study: Path) -> Path:
-    """Folder of a study whose process was killed amid its runs, and then while it measured."""
+    """Folder of a study that was killed during its runs and again while measuring."""
     folder = study.parent / "killed"
     process = subprocess.Popen(
         command("ablate", study, "--out", folder),
@@ -188,7 +186,7 @@ def killed_twice(study: Path) -> Path:
         command("ablate", "--resume", folder), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     measured = folder / "measured.jsonl"
-    # At work, and not while it is started.
+    # While it works, not while it starts.
     while not measured.exists() or measured.read_bytes().count(b"\n") < 1:
         assert process.poll() is None
         time.sleep(0.001)
@@ -203,16 +201,17 @@ def killed_twice(study: Path) -> Path:
 def worker_of(process: subprocess.Popen) -> psutil.Process:
     """The first process that measures."""
     for child in psutil.Process(process.pid).children():
-        with contextlib.suppress(psutil.NoSuchProcess):  # one that asked the system something
+        with contextlib.suppress(psutil.NoSuchProcess):  # a short-lived query of the system
             if any("spawn_main" in part for part in child.cmdline()):
                 return child
     raise AssertionError(process.communicate())
 
 
 @pytest.mark.thorough("test_hyper compares a row with a run alone, to the bit")
-def test_a_row_is_the_run_that_train_makes(killed_twice: Path, tmp_path: Path):
-    """Same seed, same settings: the same log. Here up to rounding, which differs between the two
-    programs; `test_hyper` compares a row with the run alone to the bit, on MJX.
+def test_a_row_equals_the_run_of_train(killed_twice: Path, tmp_path: Path):
+    """Same seed and settings give the same log, up to the rounding of the two programs.
+
+    `test_hyper` compares a row with the single run bit for bit, on MJX.
     """
     train = "--seed 1 --population 6 --generations 3 --drive.law pd"
     train += " --rollout.seconds 0.4 --rollout.starts 2 --rollout.lanes 4"
@@ -256,7 +255,7 @@ def test_the_same_data_give_the_same_report_byte_for_byte(
         assert (copy / name).read_bytes() == (folder / name).read_bytes(), name
 
 
-def test_a_study_that_did_not_go_through_in_one_go_ends_as_one_that_did(
+def test_a_resumed_study_equals_an_uninterrupted_one(
     finished: tuple[Path, str], study: Path, tmp_path: Path
 ):
     (tmp_path / "whole-was-killed").touch()
@@ -266,7 +265,7 @@ def test_a_study_that_did_not_go_through_in_one_go_ends_as_one_that_did(
 
 
 @pytest.mark.thorough("a study that stopped amid its runs and lost a process is compared too")
-def test_a_study_killed_twice_ends_as_one_that_was_not(
+def test_a_study_killed_twice_equals_an_uninterrupted_one(
     killed_twice: Path, study: Path, tmp_path: Path
 ):
     mjxgait_of_its_own("ablate", study, "--out", tmp_path / "whole")
@@ -274,10 +273,10 @@ def test_a_study_killed_twice_ends_as_one_that_was_not(
         assert (tmp_path / "whole" / name).read_bytes() == (killed_twice / name).read_bytes()
 
 
-def test_ctrl_c_in_the_last_generation_ends_a_study_before_it_measures(
+def test_ctrl_c_in_the_last_generation_ends_a_study_before_measuring(
     finished: tuple[Path, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Its runs are complete, and what would come next takes minutes too."""
+    """The runs are complete, but measuring takes minutes too."""
     copy = shutil.copytree(finished[0], tmp_path / "copy")
     (copy / rows.MEASURED).unlink()
 

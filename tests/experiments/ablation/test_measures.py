@@ -1,4 +1,4 @@
-"""What every champion of a study is judged by, whatever it evolved for."""
+"""Measures of every champion of a study, whatever its task."""
 
 import dataclasses
 
@@ -12,10 +12,10 @@ from mjxgait.experiments.ablation import rows
 from mjxgait.experiments.ablation.rows import walked
 
 
-def test_who_stands_is_up_where_it_must_walk_and_not_where_it_has_a_goal(
+def test_a_standing_champion_counts_as_up_in_walk_but_not_in_hop(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """For 6 s instead of 22."""
+    """Simulated for 6 s instead of 22."""
     monkeypatch.setattr(rows, "SECONDS", 6.0)
     monkeypatch.setattr(rows, "STARTS", 4)
     luxo = load_creature(find_creature("luxo"))

@@ -1,4 +1,4 @@
-"""What a study file may say, and how mistakes in it are told before anything runs."""
+"""Contents of a study file; mistakes in it are reported before anything runs."""
 
 import dataclasses
 from pathlib import Path
@@ -43,7 +43,7 @@ def test_every_variant_runs_with_every_seed(stool: Creature):
     assert all(run.config.seed == run.seed for run in found.runs)
 
 
-def test_unpaired_variants_have_seeds_of_their_own(stool: Creature):
+def test_unpaired_variants_have_their_own_seeds(stool: Creature):
     assert [run.seed for run in plan(stool, paired=False, first_seed=10).runs] == [
         10,
         11,
@@ -54,8 +54,8 @@ def test_unpaired_variants_have_seeds_of_their_own(stool: Creature):
     ]
 
 
-def test_a_variant_may_run_a_config_of_its_own_and_nothing_else(stool: Creature):
-    """The study's config and base are not laid under it; what is peculiar to a study remains."""
+def test_a_variant_with_its_own_config_ignores_that_of_the_study(stool: Creature):
+    """The study's config and base do not apply to it; the settings common to all studies do."""
     tables = [
         {"name": "base"},
         {"name": "thesis", "config": "wilson"},
@@ -73,8 +73,8 @@ def test_a_variant_may_run_a_config_of_its_own_and_nothing_else(stool: Creature)
     assert found.of("base")[0].config.rollout.starts == 5
 
 
-def test_a_variant_may_be_asked_for_a_gait_as_a_walk_is(stool: Creature):
-    """Where a gait means nothing the study says of which variant that is."""
+def test_a_variant_can_have_a_target_gait_as_a_walk_can(stool: Creature):
+    """An unsuitable gait is reported with the variant's name."""
     found = plan(stool, variant=[{"name": "base"}, {"name": "animal", "gait": "natural"}])
     assert found.of("base")[0].config.fitness.wish.asked == ()
     asked = found.of("animal")[0].config
@@ -95,8 +95,8 @@ def test_a_grid_is_the_base_and_every_combination(stool: Creature):
     )
 
 
-def test_all_runs_go_on_to_the_end(stool: Creature):
-    """One that stopped early would be compared with others that had more generations."""
+def test_no_run_stops_early(stool: Creature):
+    """A run that stopped early would be compared with runs of more generations."""
     for run in plan(stool, base={"evolution": {"target": 1.0, "forced": {"patience": 2}}}).runs:
         assert run.config.evolution.target is None
         assert run.config.evolution.forced.patience == 0
@@ -152,7 +152,7 @@ def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
         ({"qustion": "?"}, ["qustion", "question"]),
     ],
 )
-def test_mistakes_are_told_before_anything_runs(stool: Creature, keys: dict, words: list[str]):
+def test_mistakes_are_reported_before_anything_runs(stool: Creature, keys: dict, words: list[str]):
     with pytest.raises(UserError) as error:
         plan(stool, **keys)
     assert str(error.value).startswith("study.toml")
@@ -165,14 +165,14 @@ def test_mistakes_are_told_before_anything_runs(stool: Creature, keys: dict, wor
     sorted((data_folder("configs") / "ablations").glob("*.toml")),
     ids=lambda path: path.stem,
 )
-def test_the_shipped_studies_are_sound_and_have_seeds_enough(path: Path):
+def test_shipped_studies_are_valid_and_have_enough_seeds(path: Path):
     study = read_study(Path(path.stem), {})
     assert study.seeds >= 16
     creature = load_creature(data_folder("envs") / study.env)
     assert len(make_plan(study, creature, path.name).variants) >= 2
 
 
-def test_the_sizes_have_equal_evaluations():
+def test_variants_of_the_sizes_study_have_equal_evaluations():
     study = read_study(Path("sizes"), {})
     creature = load_creature(data_folder("envs") / study.env)
     spent = set()
@@ -183,7 +183,7 @@ def test_the_sizes_have_equal_evaluations():
     assert max(spent) / min(spent) < 1.05
 
 
-def test_with_other_generations_variants_keep_their_share_of_evaluations():
+def test_other_generations_keep_the_share_of_evaluations():
     study = read_study(Path("sizes"), {"generations": 41})
     assert {v.name: v.generations for v in study.variant}["population 50"] == 83
     assert {v.name: v.generations for v in study.variant}["3 key poses"] is None
@@ -194,5 +194,5 @@ def test_an_unknown_study_names_the_shipped_ones():
         read_study(Path("swiches"), {})
 
 
-def test_stool_is_a_creature_of_a_study(stool: Creature):
+def test_the_upper_bound_counts_every_simulation_step(stool: Creature):
     assert plan(stool, env=str(STOOL)).upper_bound(stool) == 6 * (5 + 1) * 256 * 3 * 1600

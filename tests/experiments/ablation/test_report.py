@@ -1,4 +1,4 @@
-"""What the report of a study says, on made-up results."""
+"""The report of a study with made-up results."""
 
 import dataclasses
 from pathlib import Path
@@ -40,9 +40,7 @@ def report(
     question: str = "?",
     **other,
 ) -> str:
-    """Of two variants: the base's runs lie around RESULT, the other's are changed by these
-    amounts or to these values.
-    """
+    """Report of two variants: the base's runs lie around RESULT, `other` changes the second's."""
     variants = (
         VariantTable(names[0]),
         VariantTable(names[1], settings or {"evolution": {"mutation_rate": 0.4}}),
@@ -91,24 +89,24 @@ def _result(plan: Plan, variant: str, seed: int, other: dict) -> Result:
     return dataclasses.replace(found, **{**shifted, **broken})
 
 
-def test_a_clear_difference_is_called_one(stool: Creature, tmp_path: Path):
+def test_a_clear_difference_is_reported(stool: Creature, tmp_path: Path):
     assert "“other” is better than “base” by 0.30" in report(stool, tmp_path, walk=0.3)
     assert "“other” is worse than “base” by 0.30" in report(stool, tmp_path, walk=-0.3)
 
 
-def test_where_fewer_is_better_fewer_is_called_better(stool: Creature, tmp_path: Path):
+def test_fewer_generations_are_reported_as_better(stool: Creature, tmp_path: Path):
     assert "“other” is better than “base” by 3" in report(
         stool, tmp_path, "generations", generations=-3
     )
 
 
-def test_no_difference_shown_is_not_called_proof_of_none(stool: Creature, tmp_path: Path):
+def test_a_missing_difference_is_not_reported_as_proof_of_none(stool: Creature, tmp_path: Path):
     text = report(stool, tmp_path)
     assert "no difference is shown" in text
     assert "That is not proof of none" in text
 
 
-def test_runs_that_broke_are_named_and_count_as_the_worst(stool: Creature, tmp_path: Path):
+def test_broken_runs_are_named_and_count_as_the_worst(stool: Creature, tmp_path: Path):
     """Six of sixteen are more than the interquartile mean cuts off."""
     text = report(stool, tmp_path, broken=range(6))
     assert "counted as the worst: other, seed 0; other, seed 1" in text
@@ -122,13 +120,15 @@ def test_runs_that_broke_are_named_and_count_as_the_worst(stool: Creature, tmp_p
         ({"measure": "fitness", "settings": {"fitness": {"speed": 0.5}}}, "not on one scale"),
     ],
 )
-def test_what_is_not_comparable_is_said(stool: Creature, tmp_path: Path, keys: dict, words: str):
+def test_variants_that_are_not_comparable_are_reported(
+    stool: Creature, tmp_path: Path, keys: dict, words: str
+):
     assert words in report(stool, tmp_path, **keys)
     assert words not in report(stool, tmp_path)
 
 
-def test_names_and_questions_are_text_and_no_program(stool: Creature, tmp_path: Path):
-    """Neither HTML nor a picture from elsewhere in the page, no formula in the table."""
+def test_names_and_questions_are_escaped(stool: Creature, tmp_path: Path):
+    """No HTML and no remote picture in the page, no formula in the table."""
     names = ("=1+1", "<img src=x> ![a](http://x) | b")
     report(stool, tmp_path, names=names, question="<script>alert(1)</script>\n# more")
     page = (tmp_path / "report.html").read_text()

@@ -27,12 +27,12 @@ def test_the_interquartile_mean_is_the_mean_of_the_middle_half():
 
 @pytest.fixture
 def fewer_resamples(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For studies by the hundred: whatever their number, an error is as frequent as is said."""
+    """Fewer resamples, for hundreds of studies; the error rate does not depend on their number."""
     monkeypatch.setattr(findings, "RESAMPLES", 399)
 
 
-def test_the_interval_covers_the_truth_as_often_as_it_says(fewer_resamples: None):
-    """Of 200 samples of a normal distribution, about 190 intervals hold its centre."""
+def test_the_interval_has_its_nominal_coverage(fewer_resamples: None):
+    """Of 200 samples of a normal distribution, about 190 intervals contain its mean."""
     covered = 0
     for seed in range(200):
         found = estimate(RNG(seed).normal(3.0, 1.0, 24))
@@ -41,13 +41,13 @@ def test_the_interval_covers_the_truth_as_often_as_it_says(fewer_resamples: None
 
 
 def test_successes_are_compared_by_their_share():
-    """Of 12 of 16 the middle half would be all."""
+    """The middle half of 12 successes in 16 would be all successes."""
     found = estimate(np.array([1.0] * 12 + [0.0] * 4), trim=0.0)
     assert found.value == 0.75
     assert 0.4 < found.low < 0.75 < found.high < 1.0
 
 
-def test_a_sample_without_spread_has_an_interval_without_width():
+def test_a_sample_without_spread_has_an_interval_of_zero_width():
     assert estimate(np.full(16, 2.5)) == Estimate(2.5, 2.5, 2.5)
 
 
@@ -65,13 +65,13 @@ def test_the_chance_of_being_better_from_never_to_always(values: list[float], ex
 
 
 def test_an_exact_permutation_test_by_hand():
-    """Of the 20 ways to part {1..6} into threes, two are as extreme as the one that was seen."""
+    """Of the 20 splits of {1..6} into threes, two are as extreme as the observed one."""
     assert permutation_p(
         np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]), paired=False
     ) == pytest.approx(2 / 20)
 
 
-def test_a_paired_test_sees_what_an_unpaired_one_does_not():
+def test_a_paired_test_finds_what_an_unpaired_one_misses():
     """Seeds differ much, the variant adds a little to each."""
     base = RNG(0).normal(0, 5, 12)
     values = base + RNG(1).normal(0.5, 0.1, 12)
@@ -84,7 +84,7 @@ def test_a_paired_test_sees_what_an_unpaired_one_does_not():
 
 
 def test_holms_published_example():
-    """Holm 1979: the smallest p times their number, the next times one less, never falling."""
+    """Holm 1979: smallest p times the number of tests, next times one less, never decreasing."""
     assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert holm([]) == []
 
@@ -97,9 +97,7 @@ def test_wilsons_interval_as_published():
 
 
 def test_no_difference_is_found_in_19_of_20_null_studies(fewer_resamples: None):
-    """Three variants that are the base, in 200 studies of seeds 0 to 199: false alarms in at
-    most about one of twenty.
-    """
+    """200 null studies, seeds 0 to 199, of three variants: about 5% false alarms at most."""
     alarms = 0
     for seed in range(200):
         samples = RNG(seed).gamma(2.0, 1.0, (4, 16))

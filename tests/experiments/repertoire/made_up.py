@@ -1,4 +1,4 @@
-"""A repertoire of the smallest creature as its commands would leave it: nobody evolves or examines it."""
+"""A repertoire of the smallest creature, made without evolution or certification."""
 
 import dataclasses
 import functools
@@ -36,7 +36,7 @@ CERTIFIED = (Cell(0.2, 0.0), Cell(0.2, 10.0))
 
 
 def begin(folder: Path) -> tuple[Path, Creature, Grid]:
-    """A copy of a repertoire that was begun once for all tests of a process: it draws many poses."""
+    """A copy of a repertoire made once per process, because making one samples many poses."""
     made, grid = _begun()
     shutil.copytree(Path(made.name) / "set", folder)
     return folder, open_run(folder / grid.cells[0].name)[0], grid
@@ -44,7 +44,7 @@ def begin(folder: Path) -> tuple[Path, Creature, Grid]:
 
 @functools.cache
 def _begun() -> tuple[tempfile.TemporaryDirectory, Grid]:
-    """A folder that stays as long as the process."""
+    """A folder that lasts as long as the process, and its grid."""
     made = tempfile.TemporaryDirectory(prefix="mjxgait-repertoire-")
     settings = Path(made.name) / "set.toml"
     settings.write_text(SMALL)
@@ -74,7 +74,7 @@ def certificate(creature: Creature, passed: bool) -> str:
 
 
 def examine(folder: Path, creature: Creature, grid: Grid) -> None:
-    """Leaves what an examination that two walks passed would."""
+    """Write champions and certificates as if two walks had passed."""
     champion = treading(creature, degrees=35.0)
     for cell in grid.cells:
         wish = {"speed": cell.speed} | ({"turn": cell.turn} if cell.turn else {})

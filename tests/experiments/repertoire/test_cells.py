@@ -1,4 +1,4 @@
-"""What a cell is as a run, and what it begins with."""
+"""Settings and first population of a cell's run."""
 
 import jax
 import numpy as np
@@ -30,7 +30,7 @@ def population(creature: Creature) -> Packed:
     return Packed({POSES: poses, "genomes.tuning": rng.normal(size=(6, 7))}, "fry")
 
 
-def test_who_walks_straight_on_has_the_controller_of_who_turns(stool: Creature):
+def test_straight_and_turning_cells_share_a_controller(stool: Creature):
     straight, left = (settings_of(cell, GRID, stool, small_config()) for cell in (STRAIGHT, LEFT))
     assert straight.wish == {"speed": 0.4}
     assert left.wish == {"speed": 0.4, "turn": 15.0}
@@ -39,7 +39,7 @@ def test_who_walks_straight_on_has_the_controller_of_who_turns(stool: Creature):
     assert alone.controller != straight.controller
 
 
-def test_all_that_turn_share_a_program(stool: Creature):
+def test_turning_cells_share_a_program(stool: Creature):
     shapes = {
         jax.tree.structure(traced(settings_of(cell, GRID, stool, small_config())))
         for cell in (LEFT, Cell(0.8, 15.0), Cell(0.4, -30.0))
@@ -47,7 +47,7 @@ def test_all_that_turn_share_a_program(stool: Creature):
     assert len(shapes) == 1
 
 
-def test_it_begins_with_who_walks_straight_on(stool: Creature):
+def test_a_turning_cell_starts_from_the_straight_population(stool: Creature):
     slow, fast = population(stool), mirror_image(population(stool), stool)
     begin = planted([Cell(0.8, 15.0), LEFT], {0.4: slow, 0.8: fast})
     for row, straight in enumerate((fast, slow)):
@@ -55,7 +55,7 @@ def test_it_begins_with_who_walks_straight_on(stool: Creature):
             np.testing.assert_array_equal(arrays[row], straight.arrays[name])
 
 
-def test_the_mirror_image_of_a_mirror_image_is_the_population(shipped: Creature):
+def test_mirroring_twice_gives_the_population_back(shipped: Creature):
     before = population(shipped)
     once = mirror_image(before, shipped)
     twice = mirror_image(once, shipped)
@@ -63,7 +63,7 @@ def test_the_mirror_image_of_a_mirror_image_is_the_population(shipped: Creature)
     assert set(twice.arrays) == set(before.arrays)
 
 
-def test_a_pose_in_the_mirror_has_left_and_right_exchanged(stool: Creature):
+def test_mirroring_a_pose_swaps_left_and_right(stool: Creature):
     names = list(stool.joints.names)
     left, right = (
         next(i for i, name in enumerate(names) if name.startswith(f"front_{side}"))
@@ -81,6 +81,6 @@ def test_a_pose_in_the_mirror_has_left_and_right_exchanged(stool: Creature):
         ({"fitness": {"wish": {"speed": 0.4}}}, "the grid asks for speeds and turns"),
     ],
 )
-def test_what_no_repertoire_can_be_made_of_is_refused(tables: dict, said: str):
+def test_unsuitable_settings_are_refused(tables: dict, said: str):
     with pytest.raises(UserError, match=said):
         check(small_config(**tables))

@@ -1,4 +1,4 @@
-"""From one walk into another while it walks: told at several moments, each on its own."""
+"""Changes from one walk to another in motion, each commanded at its own moment."""
 
 import dataclasses
 import pickle
@@ -28,7 +28,7 @@ from mjxgait.rendering.walk import record_walk
 
 LARGE, SMALL = 35.0, 30.0
 MOMENTS = 3
-"""At which a change is told; as shipped they are more, and each is simulated for 13 s."""
+"""Moments of change; the shipped value is larger, and each is simulated for 13 s."""
 CHANGES = np.array([1.0, 1.5, np.inf])
 
 
@@ -38,7 +38,7 @@ def few_moments(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def one_by_one(work: Callable, ways: Sequence, tell: Callable[[int, int], object], **_) -> list:
-    """In place of `one_per_core`: work that another process could do, in this process."""
+    """Stand-in for `one_per_core`: the work is pickled, but done in this process."""
     found = []
     for number, way in enumerate(ways, 1):
         found.append(pickle.loads(pickle.dumps(work))(pickle.loads(pickle.dumps(way))))
@@ -57,7 +57,7 @@ def film(creature: Creature, before: Champion, after: Champion, seconds: float =
 
 
 def walking_at(creature: Creature, champion: Champion, share: float = 1.0) -> Champion:
-    """The champion, asked for a share of the speed that it has."""
+    """The champion with a share of its own speed as its target."""
     walk = record_walk(creature, champion, 8.0)
     chords = walk.qpos[200:, :2] - walk.qpos[:-200, :2]
     speed = float(np.linalg.norm(chords[-1000:], axis=1).mean())
@@ -65,8 +65,8 @@ def walking_at(creature: Creature, champion: Champion, share: float = 1.0) -> Ch
 
 
 @pytest.mark.parametrize("advance", ["clock", "error"])
-def test_until_it_is_told_it_walks_as_ever(stool: Creature, advance: str):
-    """Also one that waits for its body, whose cycle has no time of its own."""
+def test_a_walk_is_unchanged_until_the_command(stool: Creature, advance: str):
+    """Also with `advance = "error"`, where the cycle waits for the body."""
     before, after = (
         dataclasses.replace(
             champion, settings=dataclasses.replace(champion.settings, advance=advance)
@@ -82,8 +82,8 @@ def test_until_it_is_told_it_walks_as_ever(stool: Creature, advance: str):
         assert np.abs(found.target[row, at + 20 :] - known[at + 20 :]).max() > 0.01
 
 
-def test_once_it_has_changed_it_walks_the_other_way(stool: Creature):
-    """Slower, with larger poses; where it is in its cycle never jumps."""
+def test_the_new_walk_is_followed_after_the_change(stool: Creature):
+    """Slower, with larger poses; the phase never jumps."""
     before, after = treading(stool, SMALL), treading(stool, LARGE, period=0.8)
     found, step = film(stool, before, after), stool.model.opt.timestep
     moved = np.diff(found.phase, axis=1) % 1.0
@@ -103,8 +103,8 @@ def test_a_change_succeeds_where_the_new_speed_is_held(stool: Creature):
     assert not succeeds(stool, before, walking_at(stool, after, share=1.3)).any()
 
 
-def test_who_falls_has_not_changed(stool: Creature, monkeypatch: pytest.MonkeyPatch):
-    """Even if it falls at the new speed and heading."""
+def test_a_change_that_ends_in_a_fall_fails(stool: Creature, monkeypatch: pytest.MonkeyPatch):
+    """Even at the new speed and heading."""
     before = walking_at(stool, treading(stool, LARGE))
     fallen = dataclasses.replace(falling(stool), wish=before.wish)
     monkeypatch.setattr(neighbours, "_as_told", lambda *_: np.ones(MOMENTS, bool))
@@ -112,7 +112,7 @@ def test_who_falls_has_not_changed(stool: Creature, monkeypatch: pytest.MonkeyPa
     assert not succeeds(stool, before, fallen).any()
 
 
-def test_headings_turn_as_the_one_walk_does_and_then_as_the_other(stool: Creature):
+def test_the_commanded_turn_rate_changes_from_one_walk_to_the_other(stool: Creature):
     straight = dataclasses.replace(treading(stool), wish={"speed": 0.2})
     turning = dataclasses.replace(straight, wish={"speed": 0.2, "turn": 30.0})
     moments, step = np.array([1.0, 2.0]), 0.01
@@ -128,10 +128,10 @@ def test_headings_turn_as_the_one_walk_does_and_then_as_the_other(stool: Creatur
     np.testing.assert_allclose(back[0, 201:], back[0, -1])
 
 
-def test_neighbours_change_there_and_back(
+def test_neighbours_change_in_both_directions(
     stool: Creature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Straight on and in a curve: who does not look where it is told has not changed."""
+    """Between straight and turning; a change with the wrong heading fails."""
     monkeypatch.setattr(neighbours, "one_per_core", one_by_one)
     folder, creature, grid = begin(tmp_path / "set")
     examine(folder, creature, grid)

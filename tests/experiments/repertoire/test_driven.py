@@ -1,4 +1,4 @@
-"""`mjxgait share` of a repertoire: a page that is driven, and says what it shows.
+"""`mjxgait share` of a repertoire: a page to drive the creature, which names what it shows.
 
 The browser tests need Chromium (apt: chromium) and the Python package playwright.
 """
@@ -17,7 +17,7 @@ from mjxgait.training.folder import CERTIFICATE
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two of its six walks are certified: 0.2 m/s straight on, and turning to the left."""
+    """Two of the six walks are certified: 0.2 m/s straight, and 0.2 m/s turning left."""
     made = begin(tmp_path_factory.mktemp("driven") / "set")
     examine(*made)
     return made[0]
@@ -36,7 +36,7 @@ def of(tab, name: str) -> float:
     return float(tab.evaluate(f"walk.dataset.{name}"))
 
 
-def test_it_stands_until_somebody_drives_it(opened):
+def test_it_stands_until_a_key_is_pressed(opened):
     tab, wrong, asked = opened
     drawn(tab)
     assert (of(tab, "speed"), of(tab, "turn")) == (0, 0)
@@ -62,7 +62,7 @@ def test_up_walks_ahead_and_left_turns_left(opened):
     assert wrong == []
 
 
-def test_nothing_certified_is_nothing_to_drive(folder: Path, tmp_path: Path, capsys):
+def test_a_repertoire_without_certified_walks_is_refused(folder: Path, tmp_path: Path, capsys):
     empty = tmp_path / "set"
     shutil.copytree(folder, empty)
     for certificate in empty.glob(f"*/{CERTIFICATE}"):

@@ -1,4 +1,4 @@
-"""Which walks a repertoire asks for, what they are called, and who is whose neighbour."""
+"""The walks of a repertoire, their names and their neighbours."""
 
 from pathlib import Path
 
@@ -10,13 +10,13 @@ from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
 THREE = Grid.of([1.0, 0.5, 0.75], [15.0])
 
 
-def test_turns_are_for_both_sides_and_straight_on_is_always_there():
+def test_turns_are_on_both_sides_and_straight_is_always_included():
     assert THREE.speeds == (0.5, 0.75, 1.0)
     assert [cell.turn for cell in THREE.cells] == [-15.0, 0.0, 15.0] * 3
     assert Grid.of([0.5], [0.0]).cells == (Cell(0.5, 0.0),)
 
 
-def test_names_say_cm_per_second_and_the_side_without_a_dot():
+def test_names_give_cm_per_second_and_the_side_without_a_dot():
     assert Cell(0.5, 0.0).name == "walk_050_straight"
     assert Cell(1.25, 15.0).name == "walk_125_left15"
     assert Cell(0.05, -22.5).name == "walk_005_right22p5"
@@ -30,12 +30,12 @@ def test_neighbours_differ_in_one_step_of_speed_or_turn():
     assert all(b in THREE.neighbours(a) and a in THREE.neighbours(b) for a, b in THREE.pairs)
 
 
-def test_to_the_other_side():
+def test_a_mirrored_cell_turns_to_the_other_side():
     assert Cell(0.5, 15.0).mirrored == Cell(0.5, -15.0)
     assert Cell(0.5, 0.0).mirrored.name == "walk_050_straight"
 
 
-def test_the_file_gives_the_grid_back(tmp_path: Path):
+def test_the_grid_is_read_back_from_its_file(tmp_path: Path):
     (tmp_path / GRID).write_text(THREE.text)
     assert Grid.read(tmp_path) == THREE
 
@@ -49,7 +49,7 @@ def test_the_file_gives_the_grid_back(tmp_path: Path):
         ([0.5, 0.501], [], "two of these walks would be called walk_050_straight"),
     ],
 )
-def test_a_grid_that_means_nothing_is_refused(speeds, turns, said: str):
+def test_an_invalid_grid_is_refused(speeds, turns, said: str):
     with pytest.raises(UserError, match=said):
         Grid.of(speeds, turns)
 

@@ -1,7 +1,6 @@
 """A repertoire of the smallest creature, from the first generation to the files for a game engine.
 
-Who evolves it are made-up hands, so that no program is compiled; `test_guests.py` looks at the
-rows.
+Stand-in workers evolve it, so that no program is compiled; `test_guests.py` tests the rows.
 """
 
 import dataclasses
@@ -41,7 +40,7 @@ def poses_of(folder: Path, cell: Cell, creature: Creature) -> np.ndarray:
     return read_stored(folder / cell.name, creature.digest).arrays[POSES]
 
 
-def test_each_walk_is_a_run_of_its_own(finished, capsys: pytest.CaptureFixture):
+def test_each_walk_has_its_own_run(finished, capsys: pytest.CaptureFixture):
     folder, _, grid = finished
     said = said_by(capsys, "inspect", folder, code=0)
     for cell in grid.cells:
@@ -51,23 +50,23 @@ def test_each_walk_is_a_run_of_its_own(finished, capsys: pytest.CaptureFixture):
         assert stored_generations(folder / cell.name)[-1] == GENERATIONS
 
 
-def test_walks_to_the_right_are_the_mirror_images_of_those_to_the_left(finished):
+def test_right_turns_are_mirror_images_of_left_turns(finished):
     folder, creature, grid = finished
     for speed in grid.speeds:
         left, right = (poses_of(folder, Cell(speed, turn), creature) for turn in (10.0, -10.0))
         np.testing.assert_array_equal(mirrored(left, creature), right)
 
 
-def test_who_turns_begins_with_the_poses_of_who_walks_straight_on(finished):
-    """Bent by the generations since then, which the checkpoint comes after."""
+def test_turning_walks_start_from_the_straight_poses(finished):
+    """The checkpoint follows two generations, each of which shifts the poses by 0.01."""
     folder, creature, grid = finished
     for speed in grid.speeds:
         straight, left = (poses_of(folder, Cell(speed, turn), creature) for turn in (0.0, 10.0))
         np.testing.assert_allclose(left, straight + 0.02, atol=1e-6)
 
 
-def test_stopped_on_the_way_it_goes_on_to_the_same_walks(finished, tmp_path: Path):
-    """Stopped after the first generation of those that turn."""
+def test_an_interrupted_repertoire_resumes_to_the_same_walks(finished, tmp_path: Path):
+    """Interrupted after the first generation of the turning walks."""
     folder, creature, grid = finished
     again, _, _ = begin(tmp_path / "again")
     assert not run(again, creature, grid, Interrupted)
@@ -81,13 +80,13 @@ def test_stopped_on_the_way_it_goes_on_to_the_same_walks(finished, tmp_path: Pat
 
 @pytest.fixture(scope="module")
 def examined(finished) -> Path:
-    """The folder as an examination that two walks passed would leave it."""
+    """The folder as if two walks had passed certification."""
     folder, creature, grid = finished
     examine(folder, creature, grid)
     return folder
 
 
-def test_what_is_certified_becomes_clips_with_their_places(
+def test_certified_walks_become_clips_with_table_entries(
     examined: Path, capsys: pytest.CaptureFixture
 ):
     folder = examined
@@ -156,7 +155,7 @@ def test_a_resumed_repertoire_keeps_its_walks(finished, capsys: pytest.CaptureFi
 def test_nothing_is_overwritten(
     tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ):
-    # A repertoire that starts all the same ends here, not after 25 walks.
+    # If the folder is accepted, fail here and not after 25 walks.
     monkeypatch.setattr(command, "begin", lambda plan: pytest.fail("the folder was accepted"))
     (tmp_path / "mine.txt").write_text("mine")
     said = said_by(capsys, "repertoire", "--env", STOOL, "--out", tmp_path, code=2)

@@ -1,4 +1,4 @@
-"""How a walk begins and ends: motions that physics has made, which fit the clips before and after them."""
+"""Start and stop clips: simulated motions that fit the clips before and after them."""
 
 import dataclasses
 
@@ -78,10 +78,10 @@ def test_a_stop_leads_from_the_stride_to_a_stand(
     assert np.abs(rests - rests[-1]).max() < 0.02
 
 
-def test_where_clips_meet_the_trunk_is_in_the_same_place(
+def test_the_trunk_position_is_continuous_between_clips(
     loops: dict[str, WalkLoop], start: Transition, stop: Transition
 ):
-    """Above the root, which is where the other clip has ended or will begin."""
+    """Relative to the root, which is where the other clip ends or begins."""
     begins = loops["walk"].qpos[0, :2]
     assert np.abs(begins).max() > 1e-3
     first, last = (motion.loop.qpos[:, :2] for motion in (start, stop))
@@ -89,10 +89,10 @@ def test_where_clips_meet_the_trunk_is_in_the_same_place(
         np.testing.assert_allclose(found, wanted, atol=1e-12)
 
 
-def test_the_root_of_the_file_moves_as_the_body_moved(
+def test_the_root_of_the_file_moves_with_the_body(
     walk: Walk, loops: dict[str, WalkLoop], start: Transition
 ):
-    """In place too, where the walks have a root that stands."""
+    """Even in an in-place file, where the root of the walks stands still."""
     frames = round(start.loop.times[-1] / walk.time_step)
     moved = (walk.qpos[frames, :2] - walk.qpos[0, :2]) - loops["walk"].qpos[0, :2]
     np.testing.assert_allclose(start.loop.path[-1], moved, atol=0.005)
@@ -104,7 +104,7 @@ def test_the_root_of_the_file_moves_as_the_body_moved(
 
 
 def root_of(document: gltf.GLTF2, number: int) -> np.ndarray:
-    """Translations [F, 3] of the first joint in one of the animations."""
+    """Translations [F, 3] of the first joint in one animation."""
     animation, root = document.animations[number], document.skins[0].joints[0]
     channel = next(
         c for c in animation.channels if (c.target.node, c.target.path) == (root, "translation")
@@ -116,8 +116,8 @@ def root_of(document: gltf.GLTF2, number: int) -> np.ndarray:
     return np.frombuffer(data, np.float32).reshape(-1, 3)
 
 
-def test_who_is_told_to_stop_walks_until_then_and_stands_after(walk: Walk):
-    """Each of several simulations at its own moment."""
+def test_a_commanded_stop_ends_the_walk_in_the_stand(walk: Walk):
+    """Each simulation stops at its own moment."""
     stool, halts = walk.creature, np.array([1.0, 1.5, np.inf])
     twin = HaltingReference(stool, walk.champion, walk.time_step, halts, np.full(3, 0.2))
     film = simulate(
@@ -127,12 +127,12 @@ def test_who_is_told_to_stop_walks_until_then_and_stands_after(walk: Walk):
     for row, halt in enumerate(halts[:2]):
         at, after = round(halt / walk.time_step), round((halt + 0.2) / walk.time_step) + 1
         np.testing.assert_array_equal(film.target[row, : at + 1], film.target[2, : at + 1])
-        # Balance may go on correcting it; this body has none.
+        # Balance could still correct the target; this body has none.
         assert np.abs(film.target[row, after:] - stool.joints.stand).max() < 1e-9
         assert np.ptp(film.phase[row, at + 1 :]) == 0
 
 
-def test_of_the_ways_to_stop_the_soonest_is_taken(walk: Walk, stop: Transition):
+def test_the_earliest_stop_is_chosen(walk: Walk, stop: Transition):
     moments = np.linspace(2.0, 2.4, PLACES)
     motions = halted(walk, moments)
     assert len(motions) == PLACES * len(FADES)
@@ -142,19 +142,19 @@ def test_of_the_ways_to_stop_the_soonest_is_taken(walk: Walk, stop: Transition):
     assert stop.loop.times[-1] < (max(lasts) - moments[0] / walk.time_step) * walk.time_step
 
 
-def test_who_falls_has_no_stop(stool: Creature, walk: Walk):
+def test_a_fall_gives_no_stop(stool: Creature, walk: Walk):
     fallen = dataclasses.replace(walk, champion=falling(stool))
     assert all(not len(motion) for motion in halted(fallen, np.linspace(2.0, 2.4, PLACES)))
 
 
-def test_whose_feet_stay_down_has_neither(stool: Creature, loops: dict[str, WalkLoop]):
+def test_without_lifted_feet_there_are_no_transitions(stool: Creature, loops: dict[str, WalkLoop]):
     still = record_walk(stool, treading(stool, degrees=4.0), 3.0)
     for made in (start_of(still, "walk", loops), stop_of(still, "walk", loops)):
         assert not made
         assert made.entry["found"] is False
 
 
-def test_turns_need_none(loops: dict[str, WalkLoop]):
+def test_turning_walks_get_no_transitions(loops: dict[str, WalkLoop]):
     cells = [Cell(0.2, 10.0), Cell(0.2, -10.0)]
     found = [Found(cell, True, 0.2, 0.0, 0.5, "trot", 0.3, ()) for cell in cells]
     assert transitions(found, loops) == []

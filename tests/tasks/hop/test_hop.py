@@ -1,4 +1,4 @@
-"""Hopping to a goal: who has which goal, what is counted on the way, and what that is worth."""
+"""Hopping to a goal: goals of the trials, episode statistics, and fitness terms."""
 
 import dataclasses
 import json
@@ -57,7 +57,7 @@ def luxo() -> Creature:
 
 
 def moment(creature: Creature, forward: float = 0.0, aside: float = 0.0, **other: object) -> Sensed:
-    """Standing, but so many m ahead and to the left of the start."""
+    """The standing body, moved ahead and to the left of the start, in m."""
     ahead, left = creature.frame.start_axes
     still = jnp.zeros(3)
     values = {
@@ -78,13 +78,13 @@ def moment(creature: Creature, forward: float = 0.0, aside: float = 0.0, **other
 
 
 def trials(creature: Creature, count: int) -> tuple[Starts, Starts]:
-    """Those of hopping, and those that every other task has with the same key."""
+    """Trials of hop, and of any other task with the same key."""
     key, settings = key_of(3), RolloutConfig(starts=count)
     task = Hop(creature, STEP, HORIZON, creature.settings.termination)
     return task.trials(key, creature, settings), draw_starts(key, creature, settings)
 
 
-def test_each_trial_has_a_goal_of_its_own_and_the_first_the_nominal(stool: Creature):
+def test_trials_have_distinct_goals_starting_with_the_nominal(stool: Creature):
     goals = np.asarray(trials(stool, 200)[0].goal)
     assert goals[0] == np.float32(NOMINAL_GOAL)
     assert len(set(goals.tolist())) == 200
@@ -93,14 +93,14 @@ def test_each_trial_has_a_goal_of_its_own_and_the_first_the_nominal(stool: Creat
     assert high - 0.05 < goals.max() <= high
 
 
-def test_but_for_the_goals_the_starts_are_everybodys(stool: Creature):
+def test_hop_trials_differ_from_other_tasks_only_in_their_goals(stool: Creature):
     hop, plain = trials(stool, 5)
     assert plain.goal is None
     for name in {field.name for field in dataclasses.fields(Starts)} - {"goal"}:
         np.testing.assert_array_equal(getattr(hop, name), getattr(plain, name), err_msg=name)
 
 
-def test_the_goal_is_sensed_along_the_starts_forward_axis(stool: Creature):
+def test_goal_distance_is_along_the_starts_forward_axis(stool: Creature):
     goal = jnp.float32(1.0)
     for forward, aside, left in (
         (0.3, 0.0, 0.7),
@@ -130,8 +130,8 @@ def test_arrival_is_the_first_step_near_the_goal(stool: Creature):
     assert after(stool, [moment(stool, 0.5)] * 6).arrived == HORIZON
 
 
-def test_who_is_beside_the_goal_is_not_there(stool: Creature):
-    """The distance is that in the plane; a sideways step may undo an arrival or bring one."""
+def test_a_body_beside_the_goal_has_not_arrived(stool: Creature):
+    """The distance is in the plane; a sideways step can undo an arrival or complete one."""
     beside = after(stool, [moment(stool, 1.0, 0.3)])
     assert beside.arrived == HORIZON
     assert float(away(beside)) == pytest.approx(0.3, abs=1e-6)
@@ -139,39 +139,39 @@ def test_who_is_beside_the_goal_is_not_there(stool: Creature):
     assert after(stool, [moment(stool, 1.0, 0.3), moment(stool, 1.0, 0.04)]).arrived == 1
 
 
-def test_near_is_a_share_of_the_way(stool: Creature):
+def test_the_arrival_radius_scales_with_the_goal_distance(stool: Creature):
     assert after(stool, [moment(stool, 1.91)], goal=2.0).arrived == 0
     assert after(stool, [moment(stool, 0.37)], goal=0.4).arrived == HORIZON
 
 
 @pytest.mark.parametrize("place", [(1.9, 0.0), (2.1, 0.0), (2.0, 0.1), (2.06, -0.08)])
-def test_how_far_off_it_ends_is_told_in_m_and_over_the_goals_distance(stool: Creature, place):
+def test_the_final_error_is_reported_in_m_and_as_a_share(stool: Creature, place):
     task = Hop(stool, STEP, HORIZON, stool.settings.termination)
     outcome = task.outcome(after(stool, [moment(stool, *place)], goal=2.0))
     assert float(outcome["left"]) == pytest.approx(0.1, abs=1e-6)
     assert float(outcome["off"]) == pytest.approx(0.05, abs=1e-6)
 
 
-def test_what_moves_after_the_arrival_is_counted(stool: Creature):
+def test_motion_after_the_arrival_is_counted(stool: Creature):
     fast = jnp.array([0.3, 0.0, 0.4])
     way = [moment(stool, forward, trunk_vel=fast) for forward in (0.0, 0.5, 1.0, 1.0, 0.7, 1.0)]
     assert after(stool, way).after == pytest.approx(3 * STEP * 0.5)
 
 
-def test_a_touch_counts_for_as_long_as_it_lasts(stool: Creature):
+def test_ground_contact_counts_every_step_it_lasts(stool: Creature):
     feet = len(stool.feet.foot_of)
     lies = moment(stool, geom_low=jnp.ones(len(stool.feet.watched)).at[feet].set(-0.001))
     steps = moment(stool, geom_low=jnp.ones(len(stool.feet.watched)).at[0].set(-0.001))
     assert after(stool, [lies, steps, lies]).ground == 2
 
 
-def test_only_the_last_posture_counts(stool: Creature):
+def test_only_the_final_posture_counts(stool: Creature):
     bent = moment(stool, joint_pos=jnp.float32(stool.joints.stand + np.array([0.1, -0.2, 0, 0.3])))
     assert after(stool, [moment(stool), bent]).bent == pytest.approx([0.1, 0.2, 0, 0.3], abs=1e-6)
     assert not after(stool, [bent, moment(stool)]).bent.any()
 
 
-def test_the_fastest_joint_of_all_moments_counts(stool: Creature):
+def test_the_fastest_joint_speed_of_the_episode_counts(stool: Creature):
     speeds = [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, -3.0, 0.0], [2.0, 0.0, 0.0, 0.0]]
     turning = [moment(stool, joint_vel=jnp.array(speed)) for speed in speeds]
     assert after(stool, turning).fastest == 3.0
@@ -185,7 +185,7 @@ MOVING = (
 
 
 @pytest.mark.parametrize("motion", MOVING)
-def test_who_has_not_moved_for_long_enough_is_at_the_end(stool: Creature, motion: dict):
+def test_an_episode_ends_after_resting_long_enough(stool: Creature, motion: dict):
     moves = moment(stool, **{name: jnp.float32(value) for name, value in motion.items()})
     rests, touching, never = jnp.float32(3), jnp.bool_(True), jnp.float32(0)
     still = [moment(stool)] * 3
@@ -211,9 +211,9 @@ CASES: list[tuple[str, float, dict]] = [
     ("distance", 0.5, HALF_WAY | {"left": -0.8}),
     ("distance", 1.0, {}),
     ("distance", 2.0, HALF_WAY | {"left": 9.0}),
-    # in the plane: the sides of a triangle are 3, 4 and 5 tenths
+    # Distance in the plane: 0.3, 0.4 and 0.5 form a right triangle.
     ("distance", 0.5, {"goal": 1.0, "left": 0.3, "aside": -0.4}),
-    # all of it up to 5 % of the goal's distance, and half of it at half of that
+    # Full penalty beyond 5 % of the goal's distance, half of it at half of that.
     ("missed", 1.0, {}),
     ("missed", 1.0, HALF_WAY | {"left": 0.09}),
     ("missed", 0.5, HALF_WAY | {"left": -0.04}),
@@ -226,21 +226,21 @@ CASES: list[tuple[str, float, dict]] = [
     ("ground", 0.6, THERE | {"ground": 300.0, "steps": 500}),
     ("fall", 1.0, THERE | {"reason": int(Reason.TIPPED)}),
     ("fall", 0.0, THERE),
-    # 14 of 20 rad/s are allowed
+    # The limit is 14 rad/s of a maximum of 20 rad/s.
     ("fast", 0.0, THERE | {"fastest": 13.9}),
     ("fast", 0.5, THERE | {"fastest": 17.0}),
     ("fast", 1.0, THERE | {"fastest": 50.0}),
-    # half of a pose range of 80 degrees is 0.698 rad
+    # Half of a pose range of 80 degrees is 0.698 rad.
     ("neutral", 0.25, THERE | {"bent": [np.radians(40), 0.0, 0.0, 0.0]}),
-    # 0.05 hip heights beyond the 0.005 at which parts only touch
+    # 0.05 hip heights beyond the 0.005 allowed for parts that only touch
     ("overlap", 0.5, THERE | {"overlap": 0.055 * 0.5}),
-    # 3 times the weight of 2 kg over the way, at least a quarter of a body length
+    # 3 times the weight of 2 kg over the distance, at least a quarter of a body length
     ("energy", 3.0, THERE | {"work": 3 * 2 * 9.81 * 1.6}),
     ("energy", 1.5, HALF_WAY | {"work": 3 * 2 * 9.81 * 0.8}),
     ("energy", 0.1 * 3.0, HALF_WAY | {"left": 1.44, "work": 3 * 2 * 9.81 * 0.25}),
     ("sub_goals", 0.5, THERE | {"closest": [0.0, 0.8, 9.0]}),
     ("sub_goals", 0.5, {"goal": 1.6, "left": 1.6, "closest": [0.0, 0.8, 9.0]}),
-    # whatever is bad at the goal is half as bad half way, and nothing for who has not moved
+    # Penalties scale with the share of the way: half at half way, none without progress.
     ("ground", 0.15, HALF_WAY | {"ground": 300.0}),
     ("fall", 0.0, {"reason": int(Reason.TIPPED)}),
     ("time", 0.0, HALF_WAY | {"left": 1.7}),
@@ -248,14 +248,14 @@ CASES: list[tuple[str, float, dict]] = [
 
 
 @pytest.mark.parametrize(("name", "value", "stats"), CASES)
-def test_a_term_is_what_its_statistics_say(stool: Creature, name: str, value: float, stats: dict):
+def test_terms_match_hand_computed_values(stool: Creature, name: str, value: float, stats: dict):
     body = altered(stool, frame={"hip_height": 0.5, "mass": 2.0, "body_length": 1.0})
     arrays = {key: jnp.asarray(number) for key, number in stats.items()}
     filled = dataclasses.replace(empty(body, HORIZON), **arrays)
     assert float(fitness_terms(body, HORIZON, filled)[name]) == pytest.approx(value, abs=1e-5)
 
 
-def test_every_term_has_a_case_that_is_not_zero():
+def test_every_term_has_a_nonzero_case():
     assert {name for name, value, _ in CASES if value} == set(TERMS)
 
 
@@ -267,8 +267,8 @@ def tallied(task: Hop, moments: list[Sensed], torques: list[list[float]]) -> Epi
     return jax.device_get(stats)
 
 
-def test_work_and_sub_goals_are_watched_only_where_they_count(stool: Creature):
-    """Braking gives no work back, and of each sub-goal the nearest moment counts."""
+def test_work_and_sub_goals_are_recorded_only_with_a_weight(stool: Creature):
+    """Braking gives no work back. For each sub-goal the nearest moment counts."""
     way = [(0.0, 0.0), (0.5, 0.1), (0.9, 0.0)]
     speed = jnp.array([1.0, -2.0, 0.0, 0.0])
     moments = [moment(stool, *place, joint_vel=speed) for place in way]
@@ -287,13 +287,13 @@ def test_work_and_sub_goals_are_watched_only_where_they_count(stool: Creature):
     evaluation = on.evaluate(stats, on.settings)
     assert set(evaluation) == set(on.terms)
     counted = on.weights(on.settings, jnp.int32(10))
-    # Style, at half of its ramp.
+    # Style weights, halfway up their ramp.
     assert float(counted["energy"]) == pytest.approx(-0.05)
     assert float(counted["sub_goals"]) == pytest.approx(-0.1)
 
 
 @pytest.mark.parametrize("points", ["[]", "[0.5, 1.5]", "[0.0]"])
-def test_sub_goals_lie_on_the_way(points: str, tmp_path: Path, luxo: Creature):
+def test_sub_goals_must_lie_on_the_way(points: str, tmp_path: Path, luxo: Creature):
     file = tmp_path / "mine.toml"
     file.write_text(f"[fitness]\nsub_goals = {points}\n")
     with pytest.raises(UserError, match=r"mine.toml: fitness\.sub_goals"):
@@ -301,8 +301,8 @@ def test_sub_goals_lie_on_the_way(points: str, tmp_path: Path, luxo: Creature):
 
 
 @pytest.mark.parametrize("generation", [0, 10, 1000])
-def test_standing_still_is_worse_than_getting_nearer_in_any_manner(generation: int):
-    """The worst manner is every style term at its most, 1, by the share of the way."""
+def test_getting_nearer_in_any_style_beats_standing_still(generation: int):
+    """The worst style has every style term at its maximum, 1, scaled by the share of the way."""
     weights = {n: float(w) for n, w in signed_weights(HopConfig(), jnp.int32(generation)).items()}
     manner = sum(weights[name] for name in STYLE if name in weights)
     scores = [
@@ -311,7 +311,7 @@ def test_standing_still_is_worse_than_getting_nearer_in_any_manner(generation: i
     assert all(np.diff(scores) > 0)
 
 
-def test_style_grows_over_the_generations_and_the_goal_does_not():
+def test_style_weights_ramp_up_and_goal_weights_do_not():
     settings = HopConfig(style_ramp=20, weights=HopWeights(distance=3.0, ground=0.5))
     by_generation = [signed_weights(settings, jnp.int32(g)) for g in (0, 10, 20, 99)]
     assert [float(weights["distance"]) for weights in by_generation] == [-3.0] * 4
@@ -342,8 +342,8 @@ ALIKE = {"joint_noise": 0.0, "velocity_noise": 0.0, "friction": (1.0, 1.0), "gai
 
 @pytest.fixture(scope="module")
 def experiment(stool: Creature, tmp_path_factory: pytest.TempPathFactory) -> Experiment:
-    """Trials that differ in nothing but their goals, by a controller that does as it reads; energy
-    and sub-goals have a weight.
+    """Trials that differ only in their goals, for a controller that follows the goal distance.
+    Energy and sub-goals have a weight.
     """
     file = tmp_path_factory.mktemp("reach") / "reach.py"
     file.write_text(REACH)
@@ -363,35 +363,35 @@ def evaluated(experiment: Experiment) -> tuple[EvolutionState, EpisodeStats]:
     return state, jax.device_get(jax.jit(experiment.simulate)(state.genomes).stats)
 
 
-def test_every_episode_is_judged_by_its_own_goal(experiment: Experiment, evaluated):
+def test_every_episode_is_evaluated_with_its_own_goal(experiment: Experiment, evaluated):
     _, stats = evaluated
     goals = np.asarray(experiment.starts.goal)
     assert len(set(goals.tolist())) == 3
     np.testing.assert_array_equal(stats.goal, np.tile(goals, (6, 1)))
     way = stats.goal - stats.left
-    # In two fifths of a second nobody gets far, and nobody stays where it was.
+    # In 0.4 s no individual gets far, but some move.
     assert (np.abs(way) < 0.4).all()
     assert np.abs(way).max() > 1e-3
 
 
-def test_evolution_weighs_energy_and_sub_goals_where_they_have_a_weight(evaluated):
+def test_weighted_energy_and_sub_goals_are_recorded(evaluated):
     _, stats = evaluated
     assert (stats.work > 0).all()
-    # In two fifths of a second all are nearest to the first point, and near neither.
+    # In 0.4 s all stay nearer to the first point and reach none.
     assert stats.closest.shape == (6, 3, 2)
     assert (stats.closest[..., 0] < stats.closest[..., 1]).all()
     assert (stats.closest[..., 0] > 0).all()
 
 
-def test_evolution_and_examiner_tell_a_controller_the_same_goals(
+def test_evolution_and_reference_simulator_use_the_same_goals(
     stool: Creature, experiment: Experiment, evaluated
 ):
     state, stats = evaluated
     starts = nominal_starts(stool, 3)
     starts.goal[:] = experiment.starts.goal
-    # The first two touch the floor a step earlier in one precision than in the other.
+    # The first two touch the floor one step earlier in one precision than in the other.
     way = (stats.goal - stats.left)[2]
-    # The statistics include the state before the last step.
+    # The statistics end before the last step.
     path = simulate(stool, experiment.champion(state, {}, 2), starts, 0.4).path[:, -2]
     np.testing.assert_allclose(way, path, atol=1e-4)
     assert np.ptp(path) > 1e-2
@@ -400,7 +400,7 @@ def test_evolution_and_examiner_tell_a_controller_the_same_goals(
 # The lamp
 
 
-def test_the_highest_joint_is_the_hip_of_what_has_no_legs(luxo: Creature):
+def test_a_body_without_legs_takes_its_highest_joint_as_hip(luxo: Creature):
     """The neck, above the ankle and both arms."""
     assert luxo.frame.hip_height == pytest.approx(luxo.frame.stand_height + 0.025 + 0.175 + 0.16)
 
@@ -414,32 +414,32 @@ def test_the_lamp_stands(luxo: Creature):
     assert last.foot_force.sum(1) == pytest.approx(luxo.frame.mass * 9.81, rel=0.02)
 
 
-def test_a_lamp_on_its_head_is_told(luxo: Creature):
+def test_a_lamp_on_its_head_touches_the_floor(luxo: Creature):
     """Folded forward until the shade meets the floor."""
     folded = np.array([luxo.joints.pose_high[0], luxo.joints.pose_high[1], luxo.joints.pose_low[2]])
     assert record(luxo, pose_champion(luxo, np.stack([folded] * 2), {}), 2.0).touch.any()
 
 
-def test_the_lamp_hops_unless_told_otherwise(luxo: Creature):
+def test_the_lamp_hops_by_default(luxo: Creature):
     usual = resolve_config(luxo.settings.train, luxo.name)
     assert (usual.use.task, type(usual.fitness)) == ("hop", HopConfig)
     walking = resolve_config(luxo.settings.train, luxo.name, use={"task": "walk"})
     assert (walking.use.task, type(walking.fitness)) == ("walk", WalkConfig)
 
 
-def test_a_layer_keeps_what_it_says_to_the_task_that_it_names():
+def test_a_settings_layer_applies_only_to_its_own_task():
     train = {"use": {"task": "hop"}, "fitness": {"style_ramp": 7}}
     assert resolve_config(train, "mine").fitness.style_ramp == 7
     assert resolve_config(train, "mine", use={"task": "walk"}).fitness == WalkConfig()
 
 
-def test_a_users_file_may_speak_of_the_lamp_alone(luxo: Creature, tmp_path: Path):
+def test_a_user_file_can_have_settings_for_the_lamp_only(luxo: Creature, tmp_path: Path):
     file = tmp_path / "mine.toml"
     file.write_text("[creature.luxo.fitness.weights]\ntime = 0.3\n")
     assert resolve_config(luxo.settings.train, "luxo", file).fitness.weights.time == 0.3
 
 
-def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
+def test_a_short_run_ends_with_a_champion_and_a_certificate(tmp_path: Path, capsys):
     folder, short = tmp_path / "run", tmp_path / "short.toml"
     short.write_text(SHORT + "[hop]\nstay = 1.0\n")
     small = "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.lanes 4"

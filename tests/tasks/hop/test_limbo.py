@@ -1,4 +1,4 @@
-"""Limbo: what a body reaches into above a bar, what that is worth, and what the examiner says."""
+"""Limbo: intrusion into the bar, its fitness term, and certification."""
 
 import dataclasses
 import json
@@ -60,7 +60,7 @@ def looker(luxo: Creature) -> Clearance:
 def posed(
     creature: Creature, ahead: float, up: float = 0.0, joints: object = None
 ) -> mujoco.MjData:
-    """Standing (or with these joint angles) so far ahead of the start and above the floor, m."""
+    """Standing, or with these joint angles, moved ahead of the start and up, in m."""
     data = mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
     data.qpos[[0, 2]] += ahead, up
@@ -71,7 +71,7 @@ def posed(
 
 
 def sensed(creature: Creature, data: mujoco.MjData) -> Sensed:
-    """What evolution would know of it; heights by MuJoCo's kinematics."""
+    """Sensed values of evolution; heights from MuJoCo's kinematics."""
     model, low = creature.model, []
     for g in creature.feet.watched:
         ball, box, round_part = support_extents(model.geom_type[g], model.geom_size[g])
@@ -104,26 +104,26 @@ def clearance(looker: Clearance, data: mujoco.MjData, height: float = HEIGHT) ->
 # Evolution
 
 
-def test_who_stands_below_the_bar_is_in_it_by_what_is_higher(luxo: Creature):
+def test_intrusion_is_the_height_above_the_bar(luxo: Creature):
     """The highest point of the lamp is at 0.42 m, ahead of its base."""
     deep = depth(luxo, posed(luxo, BAR_PLACE - 0.1))
     assert 0.42 - HEIGHT <= deep < 0.42 - HEIGHT + 0.03
     assert depth(luxo, posed(luxo, BAR_PLACE - 0.1), height=0.45) == 0.0
 
 
-def test_who_is_away_from_it_is_clear(luxo: Creature):
+def test_a_body_away_from_the_bar_is_clear(luxo: Creature):
     assert depth(luxo, posed(luxo, 0.0)) == 0.0
     assert depth(luxo, posed(luxo, BAR_PLACE + 0.4)) == 0.0
 
 
-def test_it_is_no_better_to_fly_over(luxo: Creature):
+def test_flying_over_the_bar_is_worse(luxo: Creature):
     deep = [depth(luxo, posed(luxo, BAR_PLACE, up)) for up in (0.0, 0.3, 0.6, 1.0)]
     assert min(deep) > 0
     assert all(np.diff(deep) > 0.2)
 
 
 def poses(creature: Creature, count: int) -> list[mujoco.MjData]:
-    """Anything it can do around the bar, some of it high up."""
+    """Random poses around the bar, some of them high up."""
     rng = np.random.default_rng(0)
     return [
         posed(
@@ -139,29 +139,31 @@ def poses(creature: Creature, count: int) -> list[mujoco.MjData]:
 @pytest.mark.parametrize(
     "height", [pytest.param(0.25, marks=MORE), pytest.param(0.3, marks=MORE), 0.35]
 )
-def test_what_evolution_takes_for_clear_is_clear(luxo: Creature, looker: Clearance, height: float):
-    """Of all parts, rods and springs between the watched geoms too."""
+def test_clear_in_evolution_means_clear_of_all_parts(
+    luxo: Creature, looker: Clearance, height: float
+):
+    """For all parts, including rods and springs between the watched geoms."""
     found = [(depth(luxo, d, height), clearance(looker, d, height)) for d in poses(luxo, 400)]
     deep, clear = np.array(found).T
     assert (deep == 0).sum() > 50
     assert clear[deep == 0].min() > 0
 
 
-def test_it_is_not_much_too_careful(luxo: Creature):
-    """Who is lower than the bar by 3.5 cm, or farther than that before or behind it, is clear."""
+def test_intrusion_is_conservative_by_at_most_35_mm(luxo: Creature):
+    """A body 3.5 cm or more below, before or behind the bar is clear."""
     for data in poses(luxo, 200):
         tops = data.geom_xpos[1:, 2] + luxo.model.geom_rbound[1:]
         assert depth(luxo, data, float(tops.max()) + 0.035) == 0
     assert depth(luxo, posed(luxo, BAR_PLACE - 0.15928 - 0.035)) == 0
 
 
-def test_the_bar_is_sensed(luxo: Creature):
+def test_the_bar_distance_is_sensed(luxo: Creature):
     for ahead in (0.0, 0.2, 1.0):
         value = bar_distance(luxo, sensed(luxo, posed(luxo, ahead)))
         assert float(value) == pytest.approx(BAR_PLACE - ahead, abs=1e-6)
 
 
-def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creature):
+def test_the_deepest_intrusion_costs_fitness(luxo: Creature):
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     moments = [sensed(luxo, posed(luxo, ahead)) for ahead in (0.0, 0.5, 1.4)]
     stats, params = task.init(), task.params(LimboConfig(height=HEIGHT))
@@ -169,12 +171,12 @@ def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creatu
     for moment in moments:
         stats = task.update(stats, moment, jnp.zeros(3), params, goal)
     assert float(stats.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
-    # The bar that it would have stayed beneath, and none lower than its own.
+    # The lowest bar it would have cleared, but never lower than its own.
     needed = float(task.outcome(stats)["bar"])
     assert needed == pytest.approx(HEIGHT + depth(luxo, posed(luxo, 0.5)))
     unhurt = dataclasses.replace(stats, bar=jnp.zeros(()))
     assert float(task.outcome(unhurt)["bar"]) == pytest.approx(HEIGHT)
-    # What counts is how deep it is in the bar where that is now.
+    # The intrusion counts at the bar's current height.
     deep = (float(stats.bar) - 0.03) / luxo.frame.hip_height
     terms = task.evaluate(stats, LimboConfig())
     assert float(terms["bar"]) == pytest.approx(deep / 0.3, rel=1e-4)
@@ -189,8 +191,8 @@ def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creatu
     assert all(float(clear[name]) == float(terms[name]) for name in task.terms if name != "bar")
 
 
-def test_to_run_through_the_bar_is_better_than_to_stay_before_it(luxo: Creature):
-    """Else nobody would ever learn to get beneath it. Who is there has missed nothing."""
+def test_passing_through_the_bar_beats_staying_before_it(luxo: Creature):
+    """Otherwise evolution never learns to pass beneath it. After arrival `missed` costs nothing."""
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     weights = signed_weights(LimboConfig(), jnp.int32(1000))
     assert set(weights) == set(task.terms)
@@ -198,8 +200,8 @@ def test_to_run_through_the_bar_is_better_than_to_stay_before_it(luxo: Creature)
     assert manner > float(weights["distance"])
 
 
-def test_the_bar_comes_down_in_so_many_steps_and_stays(stool: Creature):
-    """In the program that is run; the two rows come down by settings of their own."""
+def test_the_bar_comes_down_in_steps_and_stays(stool: Creature):
+    """In the compiled program; each of the two experiments follows its own settings."""
     common = {"use": {"task": "limbo"}, "evolution": {"population": 6}}
     rollout = {"seconds": 0.2, "starts": 3, "promote": 1.0, "lanes": 4}
     rows = [
@@ -234,10 +236,10 @@ def at(state: EvolutionState, **changed: float) -> EvolutionState:
         ([0.0, 0.0], [0.0, 0.0], LEADERS // 2, False),
     ],
 )
-def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
+def test_the_bar_comes_down_when_most_of_the_best_pass(
     stool: Creature, missed: list[float], bar: list[float], of: int, has_curriculum: bool
 ):
-    """Means over the two trials; and what they were worth under the higher bar is forgotten."""
+    """Means over the two trials; results from the higher bar are discarded."""
     task = Limbo(stool, STEP, HORIZON, stool.settings.termination)
     terms = np.ones((LEADERS + 3, 2, len(task.terms)), np.float32)
     terms[:of, :, task.terms.index("missed")] = missed
@@ -257,7 +259,7 @@ def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
     nobody = (at(state, generation=-1), at(state, fitness=np.full(len(terms), -np.inf)))
     assert all(int(climbed(task, settings, unjudged).level) == 4 for unjudged in nobody)
     assert climbed(task, settings, dataclasses.replace(state, level=None)).level is None
-    # Where the bar is down nothing is harder, and nothing is forgotten.
+    # At the lowest bar the level stays, and results are kept.
     down = climbed(task, LimboConfig(lowering=4), state)
     assert int(down.level) == 4
     assert not bool(down.stale)
@@ -273,7 +275,7 @@ def test_all_goals_lie_beyond_the_bar(luxo: Creature):
         task.trials(key_of(0), luxo, RolloutConfig(ground="slope:0.1"))
 
 
-def test_a_lower_bar_is_a_setting_of_the_same_program(stool: Creature):
+def test_bar_height_is_a_parameter_of_one_program(stool: Creature):
     tables = [{"fitness": {"height": height}} for height in (0.1, 5.0)]
     common = {"use": {"task": "limbo"}, "evolution": {"population": 6}}
     rollout = {"seconds": 0.2, "starts": 2, "promote": 1.0, "lanes": 4}
@@ -285,10 +287,10 @@ def test_a_lower_bar_is_a_setting_of_the_same_program(stool: Creature):
     assert jax.tree.structure(low) == jax.tree.structure(high)
 
 
-# The examiner
+# Certification
 
 
-def test_evolution_and_examiner_mean_the_same_bar_and_the_same_goals():
+def test_evolution_and_certification_have_the_same_bar_and_goals():
     acceptance = Demanded()
     assert (acceptance.place, EXAMINED_RADIUS) == (BAR_PLACE, evolution.BAR_RADIUS)
     assert acceptance.height == LimboConfig().height == HEIGHT
@@ -298,17 +300,17 @@ def test_evolution_and_examiner_mean_the_same_bar_and_the_same_goals():
     )
 
 
-def test_the_clearance_is_the_distance_of_the_nearest_part(luxo: Creature, looker: Clearance):
-    """Of the foremost: the rim of the shade, 0.159 m ahead of the base's middle."""
+def test_clearance_is_the_distance_of_the_nearest_part(luxo: Creature, looker: Clearance):
+    """The foremost part is the rim of the shade, 0.159 m ahead of the base's centre."""
     front = BAR_PLACE - EXAMINED_RADIUS - 0.15928
     assert clearance(looker, posed(luxo, front - 0.03)) == pytest.approx(0.03, abs=1e-3)
     assert clearance(looker, posed(luxo, front + 0.01)) == pytest.approx(-0.01, abs=2e-3)
     assert clearance(looker, posed(luxo, 0.0)) == FAR
-    # 0.4199 m high, below a bar at 0.45 m.
+    # The top is at 0.4199 m, below a bar at 0.45 m.
     assert clearance(looker, posed(luxo, BAR_PLACE - 0.09), 0.45) == pytest.approx(0.03, abs=2e-3)
 
 
-def test_above_the_bar_nothing_is_clear(luxo: Creature, looker: Clearance):
+def test_above_the_bar_clearance_is_negative(luxo: Creature, looker: Clearance):
     assert clearance(looker, posed(luxo, BAR_PLACE, up=1.0)) < 0
 
 
@@ -322,7 +324,7 @@ def test_each_simulation_has_its_own_bar(luxo: Creature, looker: Clearance):
 
 
 def became(clear: list[float]) -> Outcome:
-    """Ways to the goal that all arrive."""
+    """An outcome in which every trial arrives."""
     count = len(clear)
     path, nothing = np.full((count, 4400), 1.4), np.zeros((0, 4400))
     film = Trajectory(STEP, *[nothing] * 5)
@@ -330,20 +332,20 @@ def became(clear: list[float]) -> Outcome:
     return Outcome(up, np.zeros((count, 2)), path, np.array(clear), film, aside=aside)
 
 
-def test_of_the_disturbed_only_those_succeed_that_are_clear(luxo: Creature):
+def test_disturbed_trials_succeed_only_if_clear_of_the_bar(luxo: Creature):
     starts = DEMANDS.aimed(nominal_starts(luxo, 4), CONFIG)
     outcome = became([0.1, 0.001, -0.001, np.nan])
     assert DEMANDS.succeeded(outcome, starts, CONFIG).tolist() == [True, True, False, False]
 
 
 def still(creature: Creature) -> Champion:
-    """One that stands."""
+    """A champion that stands still."""
     made = pose_champion(creature, np.stack([creature.joints.stand] * 2), {})
     return dataclasses.replace(made, task="limbo")
 
 
 def standing(creature: Creature, goal: float, bar: float) -> Recording:
-    """One that stands, with its goal and a bar at such places."""
+    """Recording of a champion that stands still, with its goal and bar at these places."""
     starts = nominal_starts(creature, 1)
     starts.goal[:], starts.bar[:] = goal, (bar, HEIGHT)
     return record(creature, still(creature), 6.0, start=starts)
@@ -352,13 +354,13 @@ def standing(creature: Creature, goal: float, bar: float) -> Recording:
 @pytest.mark.parametrize(
     ("bar", "failed"), [(0.6, set()), (0.1, {3}), (-0.1, set())], ids=["far", "head", "low elbow"]
 )
-def test_criterion_3_no_part_touches_the_bar(luxo: Creature, bar: float, failed: set[int]):
+def test_criterion_3_allows_no_part_to_touch_the_bar(luxo: Creature, bar: float, failed: set[int]):
     recording = standing(luxo, 0.001, bar)
     criteria = DEMANDS.basic(recording, CONFIG)
     assert {c.number for c in criteria if not c.passed} - {2} == failed
 
 
-def test_perturbed_starts_are_watched_too(luxo: Creature):
+def test_clearance_is_measured_for_perturbed_starts(luxo: Creature):
     starts = DEMANDS.aimed(perturbed_starts(luxo, 3, np.random.default_rng(0)), CONFIG)
     starts.bar[1:, 0] = 0.1, 0.25
     outcome = simulate(luxo, still(luxo), starts, 0.2)
@@ -366,16 +368,16 @@ def test_perturbed_starts_are_watched_too(luxo: Creature):
     assert outcome.clearance[1] < 0 < outcome.clearance[2] < FAR
 
 
-def test_who_is_worth_an_examination(luxo: Creature):
+def test_validation_requires_clearing_the_certificates_bar(luxo: Creature):
     there = {"off": np.zeros(2), "seconds": np.full(2, 8.0)}
     examined = CONFIG.limbo.height
-    # It may learn with a lower bar than it is examined with, and touch that one.
+    # Training may use a lower bar than certification, and may touch that one.
     for beneath in (examined, examined - 0.02):
         assert promising(DEMANDS, there | {"bar": np.array([beneath, examined])}, 8.0, luxo)
     assert not promising(DEMANDS, there | {"bar": np.array([0.0, examined + 1e-3])}, 8.0, luxo)
 
 
-def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
+def test_a_short_run_ends_with_a_champion_and_a_certificate(tmp_path: Path, capsys):
     folder, short = tmp_path / "run", tmp_path / "short.toml"
     short.write_text(SHORT + "[limbo]\nstay = 1.0\n")
     small = "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.lanes 4"

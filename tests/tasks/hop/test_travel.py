@@ -1,4 +1,4 @@
-"""Travelling: a goal that moves on when it is reached, in evolution and in the examination."""
+"""Travelling: a goal that moves on when reached, in evolution and in certification."""
 
 import dataclasses
 from pathlib import Path
@@ -44,16 +44,16 @@ def goal_at(ahead: float, spacing: float) -> Goal:
 @pytest.mark.parametrize(
     ("forward", "goal"), [(0.0, 1.0), (0.94, 1.0), (0.96, 1.5), (1.2, 1.5), (1.44, 1.5)]
 )
-def test_a_goal_that_is_near_or_passed_moves_on_by_a_stride(
+def test_a_goal_that_is_near_or_passed_moves_on_by_its_spacing(
     stool: Creature, forward: float, goal: float
 ):
-    """Of half a metre, so near is 2.5 cm from it."""
+    """The spacing is 0.5 m, so near means within 2.5 cm."""
     moved = task(stool).next_goal(goal_at(1.0, 0.5), moment(stool, forward + 0.02))
     assert float(moved.ahead) == pytest.approx(goal)
     assert float(moved.spacing) == 0.5
 
 
-def test_evolution_and_examiner_move_goals_alike(stool: Creature):
+def test_evolution_and_certification_move_goals_alike(stool: Creature):
     rng = np.random.default_rng(0)
     first = rng.uniform(*GOALS, 200)
     goal, way = first * rng.integers(1, 4, 200), rng.uniform(-1, 6, 200)
@@ -66,13 +66,13 @@ def test_evolution_and_examiner_move_goals_alike(stool: Creature):
     assert 0 < (theirs > goal).sum() < 200
 
 
-def test_the_goal_of_other_tasks_stays(stool: Creature):
+def test_the_goal_of_other_tasks_does_not_move(stool: Creature):
     goal, way = np.array([1.0, 0.4]), np.array([1.0, 3.0])
     for name in ("walk", "hop", "limbo"):
         assert acceptance_of(name).next_goal(goal, goal, way) is goal
 
 
-def test_what_counts_is_the_way_and_what_is_told_are_the_goals(stool: Creature):
+def test_fitness_counts_the_way_and_metrics_the_goals(stool: Creature):
     travel, goal = task(stool), goal_at(0.5, 0.5)
     stats, params = travel.init(), travel.params(TravelConfig())
     assert float(travel.outcome(stats)["way"]) == 0
@@ -89,10 +89,10 @@ def test_what_counts_is_the_way_and_what_is_told_are_the_goals(stool: Creature):
     assert float(travel.evaluate(far, TravelConfig())["distance"]) < -6
 
 
-def test_a_controller_is_told_the_same_moving_goals(
+def test_evolution_and_reference_simulator_move_the_same_goals(
     stool: Creature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Strides of a few millimetres, so that all are reached in a fraction of a second."""
+    """The spacing is a few mm, so that goals are reached within 0.4 s."""
     monkeypatch.setattr(Travel, "goals", (0.004, 0.012))
     monkeypatch.setattr(Travel, "nominal", 0.008)
     file = tmp_path / "reach.py"
@@ -114,16 +114,16 @@ def test_a_controller_is_told_the_same_moving_goals(
     np.testing.assert_allclose((stats.goal - stats.left)[best], path, atol=1e-4)
 
 
-# The examiner
+# Certification
 
 
-def test_the_examiner_and_evolution_mean_the_same_goals():
+def test_certification_and_evolution_have_the_same_goals():
     acceptance = Demanded()
     assert (acceptance.goals, acceptance.nominal, travel.NEAR) == (GOALS, NOMINAL_GOAL, NEAR)
 
 
 def way(*places: tuple[float, float]) -> np.ndarray:
-    """[T] m ahead through these times in s and places in m, of 22 s."""
+    """Distance ahead [T] in m over 22 s, interpolated between (s, m) pairs."""
     return np.interp(np.arange(4400) * STEP, *zip(*places, strict=True))
 
 
@@ -143,7 +143,7 @@ def recorded(forward: np.ndarray) -> Recording:
     ],
     ids=["travels", "slow", "stops", "backwards", "blew up"],
 )
-def test_criterion_2_it_gets_on_and_does_not_stop(forward: np.ndarray, passes: bool):
+def test_criterion_2_requires_steady_progress(forward: np.ndarray, passes: bool):
     assert DEMANDS.second(recorded(forward), CONFIG).passed is passes
 
 
@@ -152,7 +152,7 @@ def test_the_report_counts_goals():
     assert (report["goals"], report["way"]) == (3, pytest.approx(3.7, abs=1e-3))
 
 
-def test_of_the_disturbed_those_succeed_that_are_fast_enough_and_up(stool: Creature):
+def test_disturbed_trials_succeed_if_fast_enough_and_upright(stool: Creature):
     path = np.stack([way((0, 0), (22, end)) for end in (4.0, 3.0, 4.0)])
     film = Trajectory(STEP, *[np.zeros((0, 4400))] * 5)
     clear = np.full(3, np.inf)

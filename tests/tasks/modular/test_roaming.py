@@ -1,4 +1,4 @@
-"""Bodies of blocks that walk towards a light, through the same run as everybody's."""
+"""Modular bodies that walk, jump or follow a light, through the same run as all creatures."""
 
 import dataclasses
 import types
@@ -43,13 +43,13 @@ COUNT = 8
 
 @pytest.fixture(scope="module")
 def experiment() -> Experiment:
-    """Little room, so that it compiles fast."""
+    """An experiment with small capacities, so that it compiles fast."""
     return build_experiment(load_creature("blocks"), build_config(TABLE, "test"))
 
 
 @pytest.fixture(scope="module")
 def first(experiment: Experiment) -> EvolutionState:
-    """The first population, judged without a generation around it; the best come first."""
+    """The first population, evaluated without a generation step; best first."""
     state, task = experiment.init(), experiment.simulator.task
     stats = jax.jit(experiment.simulate)(state.genomes).stats
     told = jax.vmap(jax.vmap(task.outcome))(stats)
@@ -76,8 +76,8 @@ def test_walkers_get_faster(experiment: Experiment):
     assert best[-1] > best[0] > 0
 
 
-def test_the_examiner_sees_them_get_as_near(experiment: Experiment, first):
-    """Body, brain, ground, light, and where it lies at the start, all written twice."""
+def test_the_reference_simulator_finds_the_same_approach(experiment: Experiment, first):
+    """Two implementations of body, brain, ground, light, and the height at the start."""
     mine, ways, elsewhere = first.outcome[:COUNT, 0, 0], [], []
     for rank in range(COUNT):
         champion = experiment.champion(first, {}, rank)
@@ -88,12 +88,12 @@ def test_the_examiner_sees_them_get_as_near(experiment: Experiment, first):
         elsewhere.append(nearer(body, simulate(body, champion, behind, 1.6, record=1)))
     lengths = np.array(ways)
     assert lengths.max() > 0.05
-    # A corner that touches a tick earlier leads elsewhere.
+    # A corner that touches one tick earlier changes the path.
     assert np.median(np.abs(mine - lengths) / lengths) < 0.05
     assert (np.abs(lengths - elsewhere) > 0.02).any(), "some go by the light"
 
 
-def test_the_examiner_shows_the_light_in_each_blocks_own_axes(experiment: Experiment, first):
+def test_reference_light_direction_is_in_each_blocks_own_axes(experiment: Experiment, first):
     champion = experiment.champion(first, {})
     body, light = champion.embodied(experiment.creature), np.array([3.0, -4.0, 1.0])
     task = acceptance_of("follow-on-land")
@@ -113,8 +113,8 @@ def test_the_examiner_shows_the_light_in_each_blocks_own_axes(experiment: Experi
         np.testing.assert_allclose(seen[part], there / np.linalg.norm(there), atol=1e-9)
 
 
-def test_who_has_a_light_of_its_own_is_simulated_for_itself(experiment: Experiment, first):
-    """Undisturbed it is like those with the same light, and like nobody else."""
+def test_only_starts_with_the_same_light_and_bar_are_shared(experiment: Experiment, first):
+    """Undisturbed starts are shared only when light and bar agree."""
     champion = experiment.champion(first, {})
     body, task = champion.embodied(experiment.creature), acceptance_of("follow-on-land")
     lights = np.array([[10.0, 0, 0], [0, 10.0, 0], [10.0, 0, 0]])
@@ -129,15 +129,15 @@ def test_who_has_a_light_of_its_own_is_simulated_for_itself(experiment: Experime
 
 
 def nearer(body: Creature, outcome: Outcome) -> float:
-    """m to what was ahead, from 0.1 s on; the statistics include what was before the last step."""
+    """Approach in m to the light ahead, from 0.1 s on; the statistics end before the last step."""
     film = outcome.trajectory
     middle = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).middle[[10, -1], :2]
     apart = np.linalg.norm(middle - [LIGHT, 0.0], axis=1)
     return float(apart[0] - apart[1])
 
 
-def test_heights_and_ways_are_watched_frame_by_frame(experiment: Experiment, first):
-    """Of those that are not recorded too. On a small moon, where every body leaps."""
+def test_heights_and_positions_are_kept_for_every_frame(experiment: Experiment, first):
+    """Also without a recording. In weak gravity (0.5 m/s²) every body leaps."""
     highest = []
     for rank in range(4):
         champion = dataclasses.replace(experiment.champion(first, {}, rank), task="jump")
@@ -146,7 +146,7 @@ def test_heights_and_ways_are_watched_frame_by_frame(experiment: Experiment, fir
         outcome = simulate(body, champion, nominal_starts(body, 2), 4.0, record=1)
         film = outcome.trajectory
         seen = seen_grown(body, film.qpos[0], film.qvel[0], 0.0)
-        # A frame is recorded before the step of which these tell the end.
+        # A frame is recorded before the step; these values follow it.
         np.testing.assert_allclose(outcome.low[0, :-1], seen.low[1:], atol=1e-9)
         moved = seen.middle[1:] - body.stand_qpos[:3]
         np.testing.assert_allclose(outcome.middle[0, :-1], moved, atol=1e-9)
@@ -159,7 +159,7 @@ def test_heights_and_ways_are_watched_frame_by_frame(experiment: Experiment, fir
 def evaluation(
     task: Roam, tilt: float = 0.0, sunk: float = 0.0, before: float = 0.0
 ) -> dict[str, float]:
-    """Of one that goes on at 1 m/s. tilt: deg at a moment in between; before: before it counts."""
+    """Terms at 1 m/s. tilt, sunk: at one moment; before: both, before settling. Angles in deg."""
     settings = RoamConfig(settle=0.5)
     stats, params = task.init(), task.params(settings)
     for k in range(task.horizon):
@@ -183,26 +183,26 @@ def task(experiment: Experiment) -> Roam:
     return Roam(found.creature, found.step, found.horizon, found.ends)
 
 
-def test_level_ways_count_from_when_it_has_settled(task: Roam):
+def test_motion_counts_only_after_settling(task: Roam):
     calm = evaluation(task, before=90.0)
     # The last moment is the one before the end.
     assert calm["speed"] == pytest.approx(1.0, rel=0.02)
     assert calm["overlap"] == calm["balance"] == pytest.approx(0, abs=1e-6)
 
 
-def test_to_tip_over_costs_speed(task: Roam):
+def test_tipping_over_costs_speed(task: Roam):
     leaning, over = (evaluation(task, tilt=tilt) for tilt in (RoamConfig().tilt, 180.0))
     assert leaning["balance"] == pytest.approx(leaning["speed"] / 2, rel=1e-3)
     assert over["balance"] > 0.9 * over["speed"]
     assert leaning["overlap"] == 0
 
 
-def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
+def test_jump_height_is_of_the_lowest_part_after_settling(task: Roam):
     jumping = Jump(task.creature, task.step, task.horizon, task.ends)
     settings = JumpConfig(settle=0.5)
 
     def jumped(sunk: float = 0.0, again: float = 0.0) -> dict[str, float]:
-        """To 0.3 m in the first half of what counts, and to another height in the second."""
+        """0.3 m high in the first half of the counted time, `again` m in the second."""
         stats, params = jumping.init(), jumping.params(settings)
         heights = {10: 0.7, 60: 0.2, 80: 0.3, 120: again, 140: again / 2}
         for k in range(task.horizon):
@@ -224,7 +224,7 @@ def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
     assert float(jumping.evaluate(half, settings)["wild"]) == pytest.approx(0.15)
 
 
-def test_to_sink_into_the_ground_costs_speed(task: Roam):
+def test_sinking_into_the_ground_costs_speed(task: Roam):
     touching, deep = (evaluation(task, sunk=sunk) for sunk in (RoamConfig().overlap, 1.0))
     assert touching["overlap"] == pytest.approx(touching["speed"] / 2, rel=1e-3)
     assert deep["overlap"] > 0.99 * deep["speed"]
@@ -233,8 +233,8 @@ def test_to_sink_into_the_ground_costs_speed(task: Roam):
 
 
 @pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
-def test_to_follow_is_to_get_nearer_to_the_light(task: Roam, follower: type):
-    """By 2 m of the 10, of which a step aside is none."""
+def test_following_counts_the_approach_to_the_light(task: Roam, follower: type):
+    """The body moves 2 m of the 10 m; a step aside gains nothing."""
     following = follower(task.creature, task.step, task.horizon, task.ends)
     settings = following.Settings(settle=0.0)
     for light, way in (([10.0, 0, 0], 2.0), ([-10.0, 0, 0], -2.0), ([0, 10.0, 0], -0.198)):
@@ -251,8 +251,8 @@ def test_to_follow_is_to_get_nearer_to_the_light(task: Roam, follower: type):
 
 @pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
 @pytest.mark.parametrize("others", [1, 2, 3, 4, 5, 64])
-def test_lights_are_balanced_and_others_in_each_round(task: Roam, follower: type, others: int):
-    """Who only swims on gains nothing by luck; and nobody learns them by heart, but the first,
+def test_lights_cancel_out_and_change_every_round(task: Roam, follower: type, others: int):
+    """Swimming straight ahead gains nothing by luck. No light can be memorized except the first,
     which is ahead.
     """
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
@@ -266,13 +266,13 @@ def test_lights_are_balanced_and_others_in_each_round(task: Roam, follower: type
     if following.axes == 2:
         assert np.abs(drawn[..., 2]).max() < 1e-6
     if others > 2:
-        # To all sides alike, and none of them twice.
+        # Evenly to all sides, without repetition.
         assert np.abs(drawn[:, -1, 1:].mean(0)).max() < 0.15
         assert len(np.unique(drawn[:, -1].round(5), axis=0)) > 0.95 * rounds
 
 
 @pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
-def test_many_lights_are_all_around(task: Roam, follower: type):
+def test_many_lights_cover_all_directions(task: Roam, follower: type):
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=200)
     lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
@@ -280,7 +280,7 @@ def test_many_lights_are_all_around(task: Roam, follower: type):
     np.testing.assert_allclose(spread[: following.axes], 1 / following.axes, atol=0.1)
 
 
-def test_in_water_lights_are_at_the_corners_of_solids_and_at_crosses(task: Roam):
+def test_lights_in_water_form_tetrahedra_and_crosses(task: Roam):
     following = FollowInWater(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=1 + 3 * 100, variety=100)
     lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
@@ -292,7 +292,7 @@ def test_in_water_lights_are_at_the_corners_of_solids_and_at_crosses(task: Roam)
     assert min(solids, crosses) > 30
 
 
-def test_who_gets_nearer_to_all_lights_is_looked_at():
+def test_validation_requires_approaching_every_light():
     acceptance, creature = acceptance_of("follow-on-land"), load_creature("blocks")
     outcome = {"way": np.array([2.0, 2.0]), "seconds": np.array([10.0, 10.0])}
     assert promising(acceptance, outcome, 10.0, creature)
@@ -300,7 +300,7 @@ def test_who_gets_nearer_to_all_lights_is_looked_at():
     assert not promising(acceptance, slow, 10.0, creature)
 
 
-def test_what_a_follower_promised_counts_from_when_evolution_counted(task: Roam):
+def test_a_promised_speed_counts_from_the_settling_time(task: Roam):
     following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
     settings, still = following.Settings(settle=0.5), jnp.zeros(3)
     params = following.params(settings)

@@ -1,4 +1,4 @@
-"""Bodies and brains that evolve together, through the same run as everybody's."""
+"""Modular swimmers whose bodies and brains evolve, through the same run as all creatures."""
 
 import dataclasses
 import json
@@ -40,13 +40,13 @@ TABLE = {
 
 @pytest.fixture(scope="module")
 def experiment() -> Experiment:
-    """Little room, so that it compiles fast."""
+    """An experiment with small capacities, so that it compiles fast."""
     return build_experiment(load_creature("blocks"), build_config(TABLE, "test"))
 
 
 @pytest.fixture(scope="module")
 def step(experiment: Experiment) -> Step:
-    """The only program that is compiled here."""
+    """The only program compiled here."""
     return experiment.compile()
 
 
@@ -68,7 +68,7 @@ def test_swimmers_get_faster(evolved: tuple[EvolutionState, list[float]]):
 
 @pytest.fixture(scope="module")
 def again(experiment: Experiment, step: Step, evolved) -> EvolutionState:
-    """The best 56, and four of them without any connection, judged as a first population."""
+    """The best 56 and four without any connection, evaluated as a first population."""
     best = evolved[0].genomes
     alone = dataclasses.replace(
         best, graph=dataclasses.replace(best.graph, used=np.zeros_like(best.graph.used))
@@ -79,22 +79,21 @@ def again(experiment: Experiment, step: Step, evolved) -> EvolutionState:
 
 
 def _without_key(state: EvolutionState) -> EvolutionState:
-    """Typed keys stay where they are."""
+    """The state without its typed key, which stays on the device."""
     return dataclasses.replace(state, key=jnp.zeros(()))
 
 
-def test_who_is_judged_again_swims_the_same(evolved, again: EvolutionState):
+def test_evaluating_again_gives_the_same_metrics(evolved, again: EvolutionState):
     np.testing.assert_allclose(again.outcome[:56], evolved[0].outcome[:56], rtol=1e-3, atol=1e-6)
 
 
-def test_a_block_alone_does_not_swim(again: EvolutionState):
-    """Nothing moves it: its way is nothing."""
+def test_a_single_block_does_not_swim(again: EvolutionState):
     way, seconds = np.moveaxis(again.outcome[56:], -1, 0)
     np.testing.assert_allclose(way, 0, atol=1e-6)
     np.testing.assert_allclose(seconds, 1.6, rtol=1e-6)
 
 
-def test_what_is_faster_or_bent_further_than_anything_alive_ends(experiment: Experiment):
+def test_implausible_speed_or_bending_ends_the_episode(experiment: Experiment):
     task = experiment.simulator.task
     assert int(task.ended(CALM, ())) == 0
     wild = dataclasses.replace(CALM, joint_vel=CALM.joint_vel.at[2].set(FASTEST_HINGE + 1))
@@ -103,8 +102,9 @@ def test_what_is_faster_or_bent_further_than_anything_alive_ends(experiment: Exp
 
 
 def evaluation(task: Swim, given: float, overlap: float = 0.0) -> dict[str, float]:
-    """Of one of 2 kg that the water pushes with 3 N along x: `given` is the share of its momentum
-    that is the water's. Counting begins in motion."""
+    """Terms of a 2 kg swimmer that the water pushes with 3 N along x. `given`: the share of its
+    momentum that the water gave. Counting begins in motion.
+    """
     settings, step = SwimConfig(settle=0.1), task.step
     stats, params = task.init(), task.params(settings)
     push, place = 3.0, 0.0
@@ -119,7 +119,7 @@ def evaluation(task: Swim, given: float, overlap: float = 0.0) -> dict[str, floa
     return {name: float(value) for name, value in task.evaluate(stats, settings).items()}
 
 
-def test_momentum_that_the_water_did_not_give_costs_speed(experiment: Experiment):
+def test_momentum_not_from_the_water_costs_speed(experiment: Experiment):
     task = experiment.simulator.task
     assert isinstance(task, Swim)
     clean, doubtful, stolen = (evaluation(task, share) for share in (1.0, 1 / 1.02, 0.5))
@@ -129,7 +129,7 @@ def test_momentum_that_the_water_did_not_give_costs_speed(experiment: Experiment
     assert clean["overlap"] == 0
 
 
-def test_blocks_in_each_other_cost_speed(experiment: Experiment):
+def test_overlapping_blocks_cost_speed(experiment: Experiment):
     task = experiment.simulator.task
     assert isinstance(task, Swim)
     touching, deep = evaluation(task, 1.0, SwimConfig().overlap), evaluation(task, 1.0, 1.0)
@@ -139,8 +139,8 @@ def test_blocks_in_each_other_cost_speed(experiment: Experiment):
     assert both["overlap"] + both["elsewhere"] < both["speed"]
 
 
-def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved):
-    """Body, brain and water, all written twice: in the end everybody is as far from where it was."""
+def test_the_reference_simulator_finds_the_same_distance(experiment: Experiment, evolved):
+    """Two implementations of body, brain and water move every swimmer equally far."""
     state, _ = evolved
     mine, ways = state.outcome[:8, 0, 0], []
     for rank in range(8):
@@ -148,7 +148,7 @@ def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved):
         body = champion.embodied(experiment.creature)
         film = simulate(body, champion, nominal_starts(body, 1), 1.6, record=1).trajectory
         middle = seen_grown(body, film.qpos[0], film.qvel[0], DRAG).middle
-        # It counts from 0.1 s on; the statistics include what was before the last step.
+        # Counting starts at 0.1 s; the statistics end before the last step.
         ways.append(np.linalg.norm(middle[-1] - middle[10]))
     lengths = np.array(ways)
     assert lengths.max() > 0.02
@@ -157,7 +157,7 @@ def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved):
     assert (apart < 0.1 * lengths + 0.002).mean() >= 0.75, "a threshold may be met a tick apart"
 
 
-def test_a_champion_is_drawn_with_the_nodes_that_its_body_grew_from(experiment, evolved):
+def test_the_drawn_graph_has_the_nodes_of_the_champions_body(experiment, evolved):
     champion = experiment.champion(evolved[0], {})
     body = champion.embodied(experiment.creature)
     parts = grow(champion.genome, champion.settings.parts, champion.settings.links)
@@ -172,7 +172,7 @@ def test_a_champion_is_drawn_with_the_nodes_that_its_body_grew_from(experiment, 
 
 
 def test_a_champion_is_drawn_with_its_ancestors(experiment: Experiment, step: Step, tmp_path: Path):
-    """In the generations that are kept; the best of each where the log says nothing of mothers."""
+    """From the stored generations; the best of each where the log lists no mothers."""
     run = tmp_path / "run"
     create_run(run, experiment.creature, experiment.config)
     state, checkpoints, lines = experiment.place(experiment.init()), Checkpoints(run), []
@@ -198,7 +198,7 @@ def test_a_champion_is_drawn_with_its_ancestors(experiment: Experiment, step: St
     assert not bodies_of(run, experiment.champion(state, {})).descend
 
 
-def test_a_champion_of_theirs_is_a_file(experiment: Experiment, evolved, tmp_path: Path):
+def test_a_modular_champion_survives_its_file(experiment: Experiment, evolved, tmp_path: Path):
     champion = experiment.champion(evolved[0], {})
     write_champion(champion, experiment.creature, tmp_path / "champion.json")
     again = read_champion(tmp_path / "champion.json", experiment.creature)

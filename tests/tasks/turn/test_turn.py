@@ -1,4 +1,4 @@
-"""Turning on the spot: what an episode counts, and what the examination asks for."""
+"""Turning on the spot: fitness terms and acceptance criteria."""
 
 import dataclasses
 
@@ -21,7 +21,7 @@ TORQUE = jnp.array([2.0, -2.0, 0.0, 0.0])
 
 
 def episode(stool: Creature, steps: int = STEPS, turn: float = 0.5, drift: float = 0.0) -> tuple:
-    """Statistics and terms after turning by so many rad/s and drifting by so many m/s."""
+    """Statistics and terms after turning at `turn` rad/s and drifting at `drift` m/s."""
     task = Turn(stool, STEP, STEPS, Termination())
     stats: TurnStats = task.init()
     for step in range(steps):
@@ -35,7 +35,7 @@ def episode(stool: Creature, steps: int = STEPS, turn: float = 0.5, drift: float
     return task, stats, task.evaluate(stats, TurnSettings(rate=90.0))
 
 
-def test_a_turn_to_the_left_counts_up_to_the_wanted_rate(stool: Creature):
+def test_a_left_turn_counts_up_to_the_target_rate(stool: Creature):
     assert episode(stool)[2]["turned"] == pytest.approx(np.degrees(0.5) / 90.0, rel=1e-4)
     assert episode(stool, turn=-0.5)[2]["turned"] == pytest.approx(
         -np.degrees(0.5) / 90.0, rel=1e-4
@@ -43,14 +43,14 @@ def test_a_turn_to_the_left_counts_up_to_the_wanted_rate(stool: Creature):
     assert episode(stool, turn=5.0)[2]["turned"] == 1.0
 
 
-def test_an_early_end_loses_the_rest_of_the_turn(stool: Creature):
+def test_an_early_end_loses_the_remaining_turn(stool: Creature):
     whole, half = episode(stool)[2], episode(stool, steps=STEPS // 2)[2]
     assert half["turned"] == pytest.approx(float(whole["turned"]) / 2, rel=1e-4)
     assert (whole["alive"], half["alive"]) == (1.0, 0.5)
 
 
-def test_the_distance_from_the_start_costs(stool: Creature):
-    """On average over the episode, in hip heights."""
+def test_distance_from_the_start_is_penalized(stool: Creature):
+    """Averaged over the episode, in hip heights."""
     mean = np.mean(0.3 * STEP * np.arange(STEPS))
     found = episode(stool, drift=0.3)
     assert found[2]["away"] == pytest.approx(mean / stool.frame.hip_height, rel=1e-4)
@@ -58,14 +58,14 @@ def test_the_distance_from_the_start_costs(stool: Creature):
     assert episode(stool)[2]["away"] == 0.0
 
 
-def test_only_work_that_drives_counts(stool: Creature):
-    """One joint brakes and gives nothing back."""
+def test_only_positive_work_counts(stool: Creature):
+    """One joint brakes and gives no work back."""
     lifted = stool.frame.mass * 9.81 * stool.frame.hip_height * STEP * STEPS
     assert episode(stool)[2]["work"] == pytest.approx(2.0 * STEP * STEPS / lifted, rel=1e-4)
 
 
 def turning(rate: float = 40.0, speed: float = 0.0, later: float = 1.0) -> Recording:
-    """A made-up turn in deg/s, with another share of it in the second half."""
+    """A made-up turn at `rate` deg/s; `later` scales the rate in the second half."""
     film = walk(speed=speed)
     steps = np.full(len(film.trunk_pos), np.radians(rate) * film.time_step)
     steps[len(steps) // 2 :] *= later
@@ -96,7 +96,7 @@ def test_each_fault_fails_its_measure(film: Recording, names: set[str]):
     assert failed(film) == names
 
 
-def test_a_tremble_fails():
+def test_trembling_fails():
     film = turning()
     time = np.arange(len(film.joint_vel)) * film.time_step
     shaken = film.joint_vel.copy()
@@ -105,7 +105,7 @@ def test_a_tremble_fails():
     assert failed(shaken) == {"buzz of a joint / joint speed"}
 
 
-def test_in_evolution_it_is_worth_a_look_from_the_certificates_rate_on(stool: Creature):
+def test_validation_starts_at_the_certificates_rate(stool: Creature):
     criteria = acceptance_of("turn")
     outcome = {
         "seconds": np.array([8.0, 8.0, 7.0]),

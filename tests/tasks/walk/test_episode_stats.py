@@ -1,4 +1,4 @@
-"""The running sums of an episode, and its end, against the same from whole recordings."""
+"""Running episode statistics and the end of an episode, against values from whole recordings."""
 
 import dataclasses
 
@@ -40,7 +40,7 @@ def body(tmp_path_factory: pytest.TempPathFactory) -> Creature:
 
 @pytest.fixture(scope="module")
 def recordings(body: Creature) -> list[Frames]:
-    """Of all episodes, falls and what comes after them included."""
+    """Recordings of all episodes, including falls and what follows them."""
     films = [outcome.trajectory for outcome in watched(body)]
     return [Frames(body, film, row) for film in films for row in range(len(DISTURBANCES))]
 
@@ -50,7 +50,7 @@ def clearance_of(body: Creature) -> float:
 
 
 def sensed_of(frames: Frames) -> Sensed:
-    """What a controller would have sensed, [T, ...]; the statistics reads no bias and no velocity."""
+    """Sensed values as for a controller, [T, ...]; the statistics use no bias and no velocity."""
     count, nothing = len(frames.qpos), np.zeros((len(frames.qpos), 3))
     heights = np.zeros((count, frames.low.shape[1], 1))
     sensed = Sensed(
@@ -69,7 +69,7 @@ def sensed_of(frames: Frames) -> Sensed:
 
 @pytest.fixture(scope="module")
 def evaluation(body: Creature, recordings: list[Frames]) -> tuple[TargetStats, jax.Array]:
-    """The statistics [E, ...] of whole episodes, and what would have ended them, [E, T]."""
+    """Statistics [E, ...] of whole episodes, and the reason to end at each step, [E, T]."""
     ends = body.settings.termination
     evaluate, clearance = StatsRecorder(body, STEP, STEPS // 2), jnp.float32(clearance_of(body))
 
@@ -91,7 +91,7 @@ def expected(body: Creature, recordings: list[Frames]) -> list[dict]:
 
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "reason"])
-def test_the_running_sum_is_the_sum(
+def test_running_sums_match_the_recordings(
     evaluation: tuple[EpisodeStats, jax.Array], expected: list[dict], name: str
 ):
     rows = zip(EPISODES, getattr(evaluation[0], name), expected, strict=True)
@@ -102,7 +102,7 @@ def test_the_running_sum_is_the_sum(
 
 
 @pytest.mark.parametrize(("contact", "down"), [(CONTACT_GAP, 1), (0.0, 0)])
-def test_a_foot_that_only_touches_is_down_unless_it_must_bear_weight(
+def test_a_near_foot_is_down_only_within_the_contact_gap(
     body: Creature, recordings: list[Frames], contact: float, down: int
 ):
     sensed = jax.tree.map(lambda leaf: leaf[0], sensed_of(recordings[0]))
@@ -115,7 +115,7 @@ def test_a_foot_that_only_touches_is_down_unless_it_must_bear_weight(
     assert stats.airborne == 1 - down
 
 
-def test_bearing_is_summed_from_the_same_moments(
+def test_reach_and_pitch_are_summed_from_the_same_moments(
     evaluation: tuple[TargetStats, jax.Array], recordings: list[Frames]
 ):
     statistics = evaluation[0]
@@ -131,7 +131,7 @@ def test_bearing_is_summed_from_the_same_moments(
     assert np.abs(statistics.pitch).max() > 0.2
 
 
-def test_an_episode_ends_where_the_recording_does(
+def test_an_episode_ends_when_the_recording_does(
     evaluation: tuple[EpisodeStats, jax.Array], recordings: list[Frames]
 ):
     found = set()

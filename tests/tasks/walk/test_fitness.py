@@ -1,4 +1,4 @@
-"""Every fitness term by hand from made-up statistics, and what becomes of the terms."""
+"""Every fitness term, computed by hand from made-up statistics; weights, score and ramps."""
 
 import dataclasses
 
@@ -23,7 +23,7 @@ from mjxgait.types import Sensed
 
 STEP, HORIZON = 0.005, 1000
 LIVED = {"steps": 1000, "forward": 2.0}
-"""A whole episode of 5 s in which a body of 1 m came 2 m forward."""
+"""A whole episode of 5 s; a body of 1 m moves 2 m forward."""
 
 CASES: list[tuple[str, float, dict]] = [
     ("distance", 2.0, {}),
@@ -37,9 +37,9 @@ CASES: list[tuple[str, float, dict]] = [
     ("slip", 0.25, {"slip": [0.1, 0.5, 0.2, 0.3]}),
     ("slip", 2.0, {"slip": [0.1, 0.5, 0.2, 0.3], "forward": 0.1}),
     ("clearance", 0.3, {"swings": [4.0] * 4, "shortfall": [1.2] * 4}),
-    # a foot that swings once while the others swing four times is down in three strides of four
+    # A foot that swings once while the others swing four times is down in three of four strides.
     ("clearance", 0.75 / 4, {"swings": [4.0, 4.0, 1.0, 4.0]}),
-    # and one that swings more often than the others is judged by its own swings
+    # A foot that swings more often than the others counts by its own swings.
     ("clearance", 0.5 / 4, {"swings": [4.0, 4.0, 8.0, 4.0], "shortfall": [0.0, 0.0, 4.0, 0.0]}),
     ("clearance", 1.0, {"swings": [0.0, 9.0, 0.0, 0.0]}),
     # 6 and 8 Hz against 0.7 of 1.2 * 4.48 * 20^-0.14 = 3.5344 Hz
@@ -49,7 +49,7 @@ CASES: list[tuple[str, float, dict]] = [
     ("duty", 0.5, {"contact": [900.0, 500, 500, 500]}),
     ("duty", 0.75, {"contact": [500.0, 100, 500, 800]}),
     ("airborne", 0.15, {"airborne": 150.0}),
-    # one to begin with, one after each swing, and of one foot three too many
+    # One touchdown at the start, one after each swing, and three too many of one foot.
     ("patter", 0.75 / 4.75 / 4, {"swings": [4.0] * 4, "touchdowns": [5.0, 5, 8, 5]}),
     ("patter", 0.0, {"swings": [4.0] * 4, "touchdowns": [5.0, 4, 5, 0]}),
     ("foot_height", 0.15, {"foot_height": 200.0}),
@@ -62,7 +62,7 @@ CASES: list[tuple[str, float, dict]] = [
     ("energy", 16.0, {"work": 2.0 * 20 * 9.81 * 2, "forward": -3.0}),
     ("saturation", 0.3, {"saturation": 300.0}),
     ("limits", 0.07, {"limits": 70.0}),
-    # 0.05 hip heights beyond the 0.005 at which parts only touch
+    # 0.05 hip heights beyond the 0.005 allowed for parts that only touch
     ("overlap", 0.5, {"overlap": 0.055 * 0.5}),
     ("overlap", 0.0, {"overlap": 0.004 * 0.5}),
     ("fall", 1.0, {"reason": int(Reason.TIPPED)}),
@@ -74,7 +74,7 @@ CASES: list[tuple[str, float, dict]] = [
 
 @pytest.fixture(scope="module")
 def body(stool: Creature) -> Creature:
-    """Of round measures."""
+    """A body with round measures."""
     return altered(stool, frame={"body_length": 1.0, "hip_height": 0.5, "mass": 20.0})
 
 
@@ -87,7 +87,7 @@ def terms_of(body: Creature, stats: dict, **fitness: float) -> dict[str, float]:
 
 
 def at_rest(body: Creature, low: jax.Array) -> Sensed:
-    """One moment of standing still, the watched shapes so far [G] above the floor."""
+    """One moment of standing still; the watched shapes are `low` [G] above the floor."""
     joints, still = jnp.zeros(len(body.joints.names)), jnp.zeros(3)
     return Sensed(
         joint_pos=joints,
@@ -106,19 +106,18 @@ IDS = [f"{name} of {' and '.join(stats) or 'a whole walk'}" for name, _, stats i
 
 
 @pytest.mark.parametrize(("name", "value", "stats"), CASES, ids=IDS)
-def test_a_term_is_what_its_statistics_say(body: Creature, name: str, value: float, stats: dict):
+def test_terms_match_hand_computed_values(body: Creature, name: str, value: float, stats: dict):
     assert terms_of(body, stats)[name] == pytest.approx(value, rel=1e-4, abs=1e-5)
 
 
 @pytest.mark.parametrize("name", TERMS)
-def test_every_term_has_a_case_that_is_not_zero(name: str):
+def test_every_term_has_a_nonzero_case(name: str):
     assert any(term == name and value for term, value, _ in CASES), (
         f'"{name}" is a fitness term that nothing computes by hand: add a row to CASES'
     )
 
 
-def test_a_case_changes_no_other_penalty(body: Creature):
-    """What is counted for one term is not counted for a second one."""
+def test_statistics_of_one_term_change_no_other_penalty(body: Creature):
     shared = {"distance", "alive", "fade", "clearance", "duty"}
     for name, _, stats in CASES:
         if set(stats) & {"steps", "forward"}:
@@ -128,8 +127,8 @@ def test_a_case_changes_no_other_penalty(body: Creature):
         assert differ <= {name} | shared, name
 
 
-def test_style_counts_by_the_share_of_the_wanted_walk(body: Creature):
-    """2 m are four ninths of 5 s at 0.9 lengths a second; distance and a foot's height are no style."""
+def test_style_penalties_scale_with_the_share_of_the_target(body: Creature):
+    """2 m are four ninths of 5 s at 0.9 body lengths/s; distance and foot height do not scale."""
     stats = {"tilt": 120.0, "foot_height": 200.0, "airborne": 150.0}
     terms = terms_of(body, stats, speed=0.9)
     assert terms["tilt"] == pytest.approx(0.12 * 4 / 9, rel=1e-4)
@@ -139,13 +138,13 @@ def test_style_counts_by_the_share_of_the_wanted_walk(body: Creature):
 
 
 @pytest.mark.parametrize(("forward", "counts"), [(0.0, 0.25), (2.0, 0.25 + 0.75 * 4 / 9), (9.0, 1)])
-def test_staying_up_counts_for_more_the_farther_one_walks(body, forward, counts):
-    """Where the wanted way is 4.5 m: who stands still must not be better than who walks."""
+def test_alive_reward_grows_with_the_distance_walked(body, forward, counts):
+    """The target distance is 4.5 m. Standing still must not score higher than walking."""
     stats = {"steps": 500, "forward": forward}
     assert terms_of(body, stats, speed=0.9)["alive"] == pytest.approx(0.5 * counts, rel=1e-4)
 
 
-def test_each_weight_meets_its_own_term_with_its_own_sign():
+def test_each_weight_has_the_place_and_sign_of_its_term():
     weights = {name: 1.0 + 0.5 * place for place, name in enumerate(TERMS)}
     vector = weight_vector(small_config(fitness={"weights": weights}).fitness, jnp.int32(0))
     expected = [weights[name] if name in REWARDS else -weights[name] for name in TERMS]
@@ -153,14 +152,14 @@ def test_each_weight_meets_its_own_term_with_its_own_sign():
     assert {"distance", "alive"} == set(REWARDS)
 
 
-def test_how_fast_a_foot_swings_is_a_term_only_where_it_costs_something():
-    """So a run that was begun before there was this term goes on."""
+def test_foot_speed_is_a_term_only_with_a_weight():
+    """Runs from before this term existed can continue."""
     assert terms_under(Weights()) == tuple(name for name in TERMS if name != "foot_speed")
     assert terms_under(Weights(foot_speed=4.0)) == TERMS
 
 
-def test_a_task_counts_what_its_settings_say(body: Creature):
-    """The terms by their weights, and a foot as down from the height that they say."""
+def test_a_task_follows_its_settings(body: Creature):
+    """The weights choose the terms; `contact` sets the height below which a foot is down."""
     for contact, whip, down in ((0.002, 0.0, 1.0), (0.0, 4.0, 0.0)):
         settings = WalkConfig(contact=contact, weights=Weights(foot_speed=whip))
         task = Walk.with_settings(body, STEP, HORIZON, body.settings.termination, settings)
@@ -172,15 +171,15 @@ def test_a_task_counts_what_its_settings_say(body: Creature):
         assert np.all(stats.contact == down)
 
 
-def test_the_score_is_the_weighted_sum_of_each_start():
+def test_score_combines_the_weighted_sums_of_the_trials():
     terms, weights = jnp.array([[1.0, 2.0], [3.0, 0.5]]), jnp.array([2.0, -1.0])
     assert float(score(terms, weights, 0.0)) == pytest.approx((0.0 + 5.5) / 2)
     assert float(score(terms, weights, 0.25)) == pytest.approx(0.75 * 2.75)
     assert np.isneginf(score(terms.at[0, 0].set(jnp.nan), weights, 0.5))
 
 
-def test_who_was_lucky_on_few_starts_is_not_believed():
-    """The more its starts differ, and the fewer they are, the less its mean is worth."""
+def test_caution_lowers_uneven_scores_of_few_trials():
+    """The mean loses more with more spread between trials and with fewer trials."""
     weights, even, uneven = jnp.ones(1), jnp.array([[2.0], [2.0]]), jnp.array([[1.0], [3.0]])
     often = jnp.tile(uneven, (2, 1))
     plain = [float(score(each, weights, 0.0)) for each in (even, uneven, often)]
@@ -190,8 +189,8 @@ def test_who_was_lucky_on_few_starts_is_not_believed():
 
 
 @pytest.mark.parametrize("steps", [0, 1, 7, 10])
-def test_ramps_rise_and_are_whole_from_their_last_step_on(steps: int):
-    """Compiled for any length: what is cut to whole numbers must become all of it."""
+def test_ramps_rise_to_exactly_one(steps: int):
+    """Compiled for any length: the value must reach 1 in spite of integer rounding."""
     now = np.arange(20)
     grown = np.asarray(jax.jit(jax.vmap(ramped, (None, 0)))(jnp.int32(steps), jnp.asarray(now)))
     at_level = np.asarray(

@@ -1,4 +1,4 @@
-"""What is asked of a walk: its worth in evolution, its footfalls, and the words for it."""
+"""Targets of a walk: their fitness terms, footfalls, and command-line values."""
 
 import dataclasses
 import itertools
@@ -52,17 +52,17 @@ SPEED = 0.4
 """m/s; 2 m in an episode."""
 FINISHED = {"steps": HORIZON}
 STANDS = FINISHED | {"contact": [1000.0] * 4, "height": 500.0, "height_squared": 250.0}
-"""For the whole episode, on all feet."""
+"""Stands on all feet for the whole episode."""
 DIES = {"steps": 40, "reason": 1, "tilt": 20.0, "touch": 1.0}
 MISSES = ("tilt", "wobble", "work", "saturation", "limits", "airborne", "foot_height", "touch")
 MISSES += ("foot_speed",)
 WHIP = {"foot_speed": 4.0}
-"""A weight that is compiled in."""
+"""This weight is compiled into the program."""
 
 
 @pytest.fixture(scope="module")
 def body(stool: Creature) -> Creature:
-    """Of round measures, with four feet where a dog has them."""
+    """A body with round measures and four feet placed like a dog's."""
     return altered(
         stool,
         frame={"body_length": 1.0, "hip_height": 0.5, "mass": 20.0},
@@ -82,7 +82,7 @@ def config_of(weights: dict | None = None, **wish) -> WalkConfig:
 
 @pytest.fixture(scope="module")
 def fitness_of(body: Creature):
-    """Fitness of one episode by its statistics, whatever the settings; compiled once."""
+    """Fitness of one episode from its statistics, for any settings; compiled once."""
     task = asked(config_of(WHIP, gait="trot", height=0.9, bounce=0.02, sway=6.0), body)
 
     @jax.jit
@@ -100,7 +100,7 @@ def fitness_of(body: Creature):
 
 
 def walking(way: float = 2.0, **more) -> dict:
-    """A steady walk of so many m; half of it in half the time."""
+    """Statistics of a steady walk of `way` m; half of it in half the time."""
     return FINISHED | {"forward": way, "forward_half": way / 2, "contact": [600.0] * 4} | more
 
 
@@ -118,7 +118,7 @@ everything = st.fixed_dictionaries(dict.fromkeys(MISSES, amount))
     steps=st.integers(40, HORIZON),
     left=st.floats(-5.0, 5.0, width=32, allow_subnormal=False),
 )
-def test_a_walk_however_bad_beats_none_at_any_weights(
+def test_any_walk_beats_no_walk_at_any_weights(
     fitness_of, weights, worth, targets, spoilt, way, steps, left
 ):
     own = Weights(**(weights | WHIP | {"distance": worth}))
@@ -126,15 +126,15 @@ def test_a_walk_however_bad_beats_none_at_any_weights(
     wish = dataclasses.replace(base.wish, weights=TargetWeights(**targets))
     config = traced_fitness(dataclasses.replace(base, weights=own, wish=wish))
     bad = walking(way, steps=steps, reason=1, left=left) | spoilt
-    # Beyond rounding: a hundredth of what it earned is left to it at least.
+    # Beyond rounding: a walk keeps at least a hundredth of its reward.
     assert fitness_of(bad, config) > 0.005 * fitness_of(bad, traced_fitness(free_of_cost(own)))
-    # Whoever stands gets nothing, whatever is spoilt besides; nor does who falls where he stands.
+    # Standing earns nothing, whatever the penalties; nor does falling on the spot.
     assert fitness_of(STANDS, config) == 0.0
     assert fitness_of(DIES | spoilt, config) == 0.0
 
 
 def free_of_cost(weights: Weights) -> WalkConfig:
-    """The same rewards, and nothing that costs."""
+    """The same rewards without penalties."""
     nothing = dict.fromkeys((n for n in TERMS if n not in REWARDS), 0.0)
     free = dict.fromkeys((field.name for field in dataclasses.fields(TargetWeights)), 0.0)
     base = config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0)
@@ -146,7 +146,7 @@ def traced_fitness(config: WalkConfig) -> WalkConfig:
     return traced(Config(fitness=config)).fitness
 
 
-def test_the_speed_is_held_from_both_sides(fitness_of):
+def test_fitness_peaks_at_the_target_speed(fitness_of):
     config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0))
     worth = [fitness_of(walking(way), config) for way in (0.5, 1.0, 1.8, 2.0, 2.2, 3.0, 4.0, 8.0)]
     assert np.argmax(worth) == 3
@@ -154,21 +154,23 @@ def test_the_speed_is_held_from_both_sides(fitness_of):
     assert (np.diff(worth[3:]) < 0).all()
 
 
-def test_who_lunges_and_falls_is_no_walker(fitness_of):
-    """All of the way in an eighth of the time is worth less than half of it on the feet."""
+def test_a_lunge_scores_less_than_half_a_walk(fitness_of):
+    """The full distance in an eighth of the time, then a fall, scores less than half the distance
+    without a fall.
+    """
     config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0))
     lunge = walking(2.0, steps=125, reason=1, forward_half=2.0, contact=[75.0] * 4)
     assert fitness_of(lunge, config) < fitness_of(walking(1.0), config)
 
 
 @pytest.mark.parametrize("name", MISSES)
-def test_less_of_a_penalty_is_better(fitness_of, name: str):
+def test_fitness_falls_as_a_penalty_grows(fitness_of, name: str):
     config = traced_fitness(config_of(WHIP, gait="trot", height=0.9, bounce=0.02, sway=6.0))
     worth = [fitness_of(walking() | {name: value}, config) for value in (200.0, 400.0, 800.0)]
     assert worth[0] > worth[1] > worth[2]
 
 
-def test_posture_is_held_from_both_sides(body: Creature, fitness_of):
+def test_fitness_peaks_at_the_target_posture(body: Creature, fitness_of):
     config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0))
 
     def carried(height: float, bounce: float) -> float:
@@ -183,7 +185,7 @@ def test_posture_is_held_from_both_sides(body: Creature, fitness_of):
     assert worth[1] > max(worth[0], worth[2])
 
 
-def test_without_a_wish_nothing_is_looked_at(body: Creature):
+def test_without_targets_a_walk_has_no_target_terms(body: Creature):
     free = small_config().fitness
     task = Walk.with_settings(body, STEP, HORIZON, body.settings.termination, free)
     assert type(task) is Walk
@@ -194,7 +196,7 @@ def test_without_a_wish_nothing_is_looked_at(body: Creature):
 
 
 def footfalls_of(phases: list[float], duty: float, period: int = 160) -> Footfalls:
-    """Of feet that stand for `duty` of the cycle about these phases, 12 cycles long."""
+    """Footfalls of feet that stand for `duty` of the cycle around these phases, over 12 cycles."""
     time = np.arange(12 * period) / period
     off = (time[:, None] - np.array(phases) + 0.5) % 1.0 - 0.5
     swinging = jnp.asarray(np.abs(off) > duty / 2, jnp.float32)
@@ -229,14 +231,16 @@ WAYS = [
 
 
 def made_up(feet: int, name: str, way: int) -> tuple[list[float], float]:
-    """Phases by foot and the duty factor of a gait in the middle of its range."""
+    """Phases by foot and a duty factor within the range of a gait."""
     gait = gait_of(name, feet)
     low, high = gait.duty
     return placed(gait, stations_of(PLACES[feet]))[way], min(max(0.45, low + 0.1), high - 0.1)
 
 
 @pytest.mark.parametrize(("feet", "name", "way"), WAYS)
-def test_what_is_asked_for_is_what_the_examiner_calls_so(dog_sizes, feet: int, name: str, way: int):
+def test_a_target_gait_gets_its_own_label_in_certification(
+    dog_sizes, feet: int, name: str, way: int
+):
     phases, duty = made_up(feet, name, way)
     size = dataclasses.replace(
         dog_sizes, foot_names=tuple("abcdef"[:feet]), foot_places=tuple(PLACES[feet])
@@ -252,10 +256,8 @@ def dog_sizes():
     return DOG
 
 
-def test_a_stance_is_where_it_presses():
-    """Hind feet that come down late, but are low for as long before: their phase is that of their
-    contact.
-    """
+def test_stance_phase_follows_contact():
+    """The hind feet are low early but touch late: their phase is that of the contact."""
     period, share = 160, 0.6
     time = np.arange(12 * period) / period
     phase = time[:, None] - np.array([0.0, 0.5, 0.0, 0.5])
@@ -276,7 +278,7 @@ def test_a_stance_is_where_it_presses():
 
 
 @pytest.mark.parametrize(("feet", "name", "way"), WAYS)
-def test_footfalls_miss_other_gaits_more_than_their_own(feet: int, name: str, way: int):
+def test_footfalls_match_their_own_gait_best(feet: int, name: str, way: int):
     phases, duty = made_up(feet, name, way)
     falls, stations = footfalls_of(phases, duty), stations_of(PLACES[feet])
     share = jnp.full(feet, duty)
@@ -288,7 +290,7 @@ def test_footfalls_miss_other_gaits_more_than_their_own(feet: int, name: str, wa
             assert by > 0.2, other
 
 
-def test_a_foot_that_never_swings_misses_every_gait():
+def test_a_foot_that_never_swings_matches_no_gait():
     phases, duty = made_up(4, "trot", 0)
     falls = footfalls_of(phases, duty)
     dragged = dataclasses.replace(
@@ -305,15 +307,14 @@ def test_a_foot_that_never_swings_misses_every_gait():
     assert float(gait_missed("trot", stations, none, share)) > 0.7
 
 
-def test_stations_are_by_side_and_from_the_front():
+def test_stations_are_ranked_from_the_front_by_side():
     for places in itertools.permutations(PLACES[4]):
         stations = stations_of(places)
         for (ahead, left), (rank, is_left) in zip(places, stations, strict=True):
             assert (rank, is_left) == (int(ahead < 0), left > 0)
 
 
-def test_who_turns_is_told_a_heading_that_turns(body: Creature):
-    """And its way is what it goes along that heading."""
+def test_a_turn_target_turns_the_heading_goal(body: Creature):
     task = asked(config_of(turn=30.0), body)
     starts = task.trials(key_of(0), body, small_config().rollout)
     goal = task.goal(jax.tree.map(lambda leaf: leaf[0], starts))
@@ -322,7 +323,7 @@ def test_who_turns_is_told_a_heading_that_turns(body: Creature):
     assert float(goal[0]) == pytest.approx(np.radians(30.0), rel=1e-4)
 
 
-def test_who_is_steered_goes_straight_once_and_to_both_sides(body: Creature):
+def test_steer_trials_go_straight_once_and_to_both_sides(body: Creature):
     task = asked(config_of(steer=40.0), body)
     rollout = dataclasses.replace(small_config().rollout, starts=5)
     turn = np.degrees(task.trials(key_of(0), body, rollout).goal)
@@ -347,13 +348,13 @@ def test_speeds_and_turns_share_a_program_and_gaits_do_not():
         assert shape(**one) != shape(**other)
 
 
-def test_rows_of_one_program_are_told_to_turn_each_at_its_own_rate(stool: Creature):
+def test_experiments_in_one_program_keep_their_own_turn_rates(stool: Creature):
     configs = [small_config(fitness={"wish": {"speed": SPEED, "turn": t}}) for t in (10.0, -30.0)]
     for one, rate in zip(build_batch(stool, configs).experiments, (10.0, -30.0), strict=True):
         np.testing.assert_allclose(np.degrees(one.starts.goal), rate, rtol=1e-6)
 
 
-def test_none_can_be_told_to_turn_and_be_steered():
+def test_turn_and_steer_exclude_each_other():
     with pytest.raises(UserError, match="turn and steer"):
         config_of(turn=10.0, steer=10.0)
 
@@ -362,17 +363,17 @@ def test_none_can_be_told_to_turn_and_be_steered():
     ("text", "speed"),
     [("0.4", 0.4), ("0.4m/s", 0.4), ("0.5bl/s", 0.5), (".5 BL/S", 0.5), ("fr0.2", 0.99045)],
 )
-def test_a_speed_in_words(body: Creature, text: str, speed: float):
+def test_speed_is_parsed_in_each_unit(body: Creature, text: str, speed: float):
     assert speed_of(text, body) == pytest.approx(speed, rel=1e-4)
 
 
 @pytest.mark.parametrize("text", ["fast", "0", "-1", "fr0.2bl/s", "0.4km/h", "nan", ""])
-def test_what_is_no_speed_is_refused(body: Creature, text: str):
+def test_an_invalid_speed_is_rejected(body: Creature, text: str):
     with pytest.raises(UserError, match="--speed"):
         speed_of(text, body)
 
 
-def test_wishes_are_names_for_settings(body: Creature):
+def test_targets_set_fitness_and_controller_settings(body: Creature):
     config = with_targets(Config(), body, WalkTargets(speed="0.25", gait="trot", turn=20.0))
     assert config.fitness.wish.table == {"speed": 0.25, "gait": "trot", "turn": 20.0}
     assert config.controller.interpolation > Config().controller.interpolation
@@ -383,7 +384,7 @@ def test_wishes_are_names_for_settings(body: Creature):
     assert with_targets(Config(), body, WalkTargets()) == Config()
 
 
-def test_natural_is_the_gait_of_an_animal_at_this_speed(body: Creature):
+def test_natural_picks_an_animals_gait_at_this_speed(body: Creature):
     def asked(**targets) -> Config:
         return with_targets(Config(), body, WalkTargets(gait="natural", **targets))
 
@@ -404,25 +405,25 @@ def usually(creature: Creature, file: Path | None = None, **asked) -> Config:
 
 
 def natural_dog() -> Creature:
-    """A dog that walks as an animal of its size does where nothing is requested."""
+    """A dog with the natural gait as its default."""
     files = load_creature(data_folder("envs") / "tall_quadruped").files
     return load_files({**files, SETTINGS: files[SETTINGS] + '[usual]\ngait = "natural"\n'})
 
 
-def test_a_creature_may_have_a_usual_gait():
+def test_a_creature_can_set_a_default_gait():
     creature = natural_dog()
     assert usually(creature) == usually(creature, gait="natural")
     assert usually(creature).fitness.wish.stride == 1.0
 
 
 @pytest.mark.parametrize("name", shipped_creatures())
-def test_no_shipped_creature_has_a_usual_gait(name: str):
-    """Its search begins with random poses, as the thesis has it; a drawn cycle must be requested."""
+def test_no_shipped_creature_has_a_default_gait(name: str):
+    """The search starts from random poses, as in the thesis; a drawn cycle must be requested."""
     creature = load_creature(data_folder("envs") / name)
     assert creature.settings.usual.gait == "auto"
 
 
-def test_what_is_asked_or_written_in_a_file_is_all_that_is_asked(tmp_path: Path):
+def test_any_target_or_settings_file_replaces_the_default_gait(tmp_path: Path):
     creature = natural_dog()
     (tmp_path / "mine.toml").write_text("[evolution]\npopulation = 40\n")
     nothing = Config().fitness.wish
@@ -433,7 +434,7 @@ def test_what_is_asked_or_written_in_a_file_is_all_that_is_asked(tmp_path: Path)
     assert usually(facing(creature, "back")).fitness.wish == nothing
 
 
-def test_a_usual_gait_that_it_does_not_have_is_named(stool: Creature):
+def test_an_unknown_default_gait_is_reported_with_its_file(stool: Creature):
     odd = load_files(
         {**stool.files, SETTINGS: stool.files[SETTINGS] + '[usual]\ngait = "waddle"\n'}
     )
@@ -441,7 +442,7 @@ def test_a_usual_gait_that_it_does_not_have_is_named(stool: Creature):
         usually(odd)
 
 
-def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):
+def test_natural_starts_from_a_drawn_cycle_at_an_animals_period(body: Creature):
     slow, fast = (
         with_targets(Config(), body, WalkTargets(gait="natural", speed=speed)).controller
         for speed in ("0.2", "1.0")
@@ -453,7 +454,7 @@ def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):
         low, high = config.tuning.period
         assert low < animal_stride(speed, hip) / speed < high
     assert with_targets(Config(), body, WalkTargets(speed="0.2")).controller.around == slow.around
-    # A controller without poses has nothing to begin near.
+    # A controller without poses has no poses to start from.
     other = dataclasses.replace(Config(), use=UseConfig("program", "walk"))
     natural = with_targets(other, body, WalkTargets(gait="natural"))
     assert natural.controller == other.controller
@@ -461,7 +462,7 @@ def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):
 
 
 @pytest.mark.parametrize("wish", [{"gait": "natural"}, {"gait": "canter"}, {"speed": "0.4"}])
-def test_a_requested_gait_or_speed_keeps_the_order_of_the_poses(body: Creature, wish: dict):
+def test_a_gait_or_speed_target_keeps_the_pose_order(body: Creature, wish: dict):
     default = resolve_config({}, "x")
     assert (default.evolution.crossing, default.evolution.mutation) == ("mixed", "mixed")
     found = with_targets(default, body, WalkTargets(**wish)).evolution
@@ -470,21 +471,21 @@ def test_a_requested_gait_or_speed_keeps_the_order_of_the_poses(body: Creature, 
     assert with_targets(default, body, WalkTargets(turn=20.0)).evolution == default.evolution
 
 
-def test_a_gait_by_name_begins_with_its_own_footfalls(body: Creature):
+def test_a_named_gait_starts_with_its_own_footfalls(body: Creature):
     def drawn(name: str) -> tuple[float, ...]:
         return with_targets(Config(), body, WalkTargets(gait=name)).controller.around
 
     cycles = {name: drawn(name) for name in ("walk", "amble", "trot", "pace")}
     assert len(set(cycles.values())) == 4
     assert () not in cycles.values()
-    # Of those whose halves do not mirror each other none is drawn.
+    # Gaits whose halves are no mirror images have no drawn cycle.
     assert [drawn(name) for name in ("canter", "bound", "gallop")] == [()] * 3
     assert with_targets(Config(), body, WalkTargets(turn=20.0)).controller.around == ()
 
 
 @pytest.mark.parametrize("name", ["walk", "amble", "trot", "pace"])
-def test_a_drawn_gait_is_what_its_name_says(dog_sizes, name: str):
-    """By the examiner, from which feet stand in each pose of the cycle."""
+def test_a_drawn_gait_gets_its_own_label(dog_sizes, name: str):
+    """The label certification gives to the feet that stand in each pose of the cycle."""
     body = load_creature(data_folder("envs") / "short_quadruped")
     config = with_targets(Config(), body, WalkTargets(gait=name)).controller
     half = np.array(config.around).reshape(config.key_poses, -1)
@@ -514,7 +515,7 @@ def test_a_drawn_gait_is_what_its_name_says(dog_sizes, name: str):
     assert gait_name(size, duty, (phases - phases[0]) % 1.0) in gait.labels
 
 
-def test_who_sets_a_low_limit_instead_of_a_wish_is_told(body: Creature):
+def test_a_low_speed_limit_without_a_target_gives_a_hint(body: Creature):
     def said(**fitness) -> str | None:
         return hint(small_config(fitness=fitness))
 
@@ -523,12 +524,12 @@ def test_who_sets_a_low_limit_instead_of_a_wish_is_told(body: Creature):
     assert said(speed=0.3, wish={"speed": 0.3}) is None
 
 
-def test_every_style_is_a_table_of_settings(body: Creature):
+def test_every_style_changes_the_settings(body: Creature):
     for name in ("calm", "sneaky", "heavy", "proud", "tired", "hurried"):
         assert with_targets(Config(), body, WalkTargets(style=name)) != Config()
 
 
-def test_to_walk_anywhere_is_learnt_on_all_that_it_is_asked_for(body: Creature):
+def test_anywhere_trains_on_everything_its_certificate_tests(body: Creature):
     assert with_targets(Config(), body, WalkTargets(certificate="walks")) == Config()
     config = with_targets(Config(), body, WalkTargets(certificate="anywhere"))
     asked, rollout = StressConfig(), config.rollout
@@ -551,19 +552,19 @@ def test_to_walk_anywhere_is_learnt_on_all_that_it_is_asked_for(body: Creature):
         (WalkTargets(style="none.toml"), "no such file"),
     ],
 )
-def test_what_means_nothing_is_refused(body: Creature, targets: WalkTargets, says: str):
+def test_an_invalid_target_is_rejected(body: Creature, targets: WalkTargets, says: str):
     with pytest.raises(UserError, match=says):
         with_targets(Config(), body, targets)
 
 
-def test_a_style_file_with_an_unknown_key_is_named(body: Creature, tmp_path):
+def test_an_unknown_key_in_a_style_file_is_reported(body: Creature, tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("[fitness]\nclearence = 0.2\n")
     with pytest.raises(UserError, match=r"mine\.toml.*clearence"):
         with_targets(Config(), body, WalkTargets(style=str(file)))
 
 
-def test_a_champion_remembers_what_was_asked(stool: Creature, tmp_path):
+def test_a_champion_file_keeps_its_targets(stool: Creature, tmp_path):
     poses = np.stack([stool.joints.stand] * 2)
     plain = pose_champion(stool, poses, {})
     champion = dataclasses.replace(plain, wish={"speed": 0.4, "gait": "trot"})
