@@ -136,7 +136,7 @@ def promising(
 
 
 class Unasked:
-    """See `AcceptanceCriteria`: for a task without targets.
+    """Implementation of `AcceptanceCriteria`: for a task without targets.
 
     revision: see `AcceptanceCriteria`.
     """
@@ -144,32 +144,34 @@ class Unasked:
     revision: int = 0
 
     def asked(self, wish: Wish) -> Any:
-        """See `AcceptanceCriteria`: the same."""
+        """Return these criteria: targets add none."""
         return self
 
     def commanded_heading(self, steps: int, time_step: float) -> np.ndarray | None:
-        """See `AcceptanceCriteria`: straight ahead."""
+        """Command no heading: straight ahead."""
         return None
 
     def commands(
         self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
     ) -> np.ndarray | None:
-        """See `AcceptanceCriteria`: none."""
+        """Command no headings."""
         return None
 
     def obeyed(
         self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: nothing was commanded."""
+        """Return no criteria: nothing was commanded."""
         return ()
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `AcceptanceCriteria`: those that are down."""
+        """Mask of the simulations that are down."""
         return ~outcome.stayed_up
 
 
 class StaysUp(Unasked):
-    """See `AcceptanceCriteria`: criteria 4 and 5 for tasks with no goal but to be up at the end.
+    """Implementation of `AcceptanceCriteria`.
+
+    Criteria 4 and 5 for tasks with no goal but to be up at the end.
 
     drag, pushed, by_pushes, grown, leaps, worth: see `AcceptanceCriteria`.
     """
@@ -182,33 +184,33 @@ class StaysUp(Unasked):
     worth: float = 1.0
 
     def fall(self, config: CertificateConfig) -> Fall:
-        """See `AcceptanceCriteria`: as criterion 1 has it."""
+        """Return the conditions of criterion 1."""
         return config.upright
 
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `AcceptanceCriteria`: as they are."""
+        """Return the starts unchanged."""
         return starts
 
     def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """See `AcceptanceCriteria`: the same."""
+        """Keep the goals."""
         return goal
 
     def kept(
         self, champion: Champion, whole: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: evolution has promised nothing."""
+        """Return no criteria: evolution has promised nothing."""
         return ()
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `AcceptanceCriteria`: those that have stayed up."""
+        """Mask of the simulations that stayed up."""
         return outcome.stayed_up
 
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: 4 and 5."""
+        """Evaluate criteria 4 and 5."""
         return criteria.starts(started, config), criteria.pushes(pushed, config)
 
 
@@ -229,7 +231,7 @@ class HasCriteria(Protocol):
 
 
 class PlainCriteria(StaysUp):
-    """See `AcceptanceCriteria`."""
+    """Implementation of `AcceptanceCriteria`."""
 
     verdict = "it does what its task demands"
 
@@ -239,7 +241,7 @@ class PlainCriteria(StaysUp):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: stays up, at half the time step too; physics, parts, and its own."""
+        """Stays up, at half the time step too; physics, parts, and its own."""
         window = whole.window(config.warmup)
         repeated = self._basic(halved, config)
         failed = sum(not m.passed for c in repeated for m in c.measures)
@@ -263,7 +265,7 @@ class PlainCriteria(StaysUp):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `AcceptanceCriteria`: to the end."""
+        """Whether the episode lasts to the end."""
         return to_the_end(outcome, seconds, creature)
 
     def _basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:

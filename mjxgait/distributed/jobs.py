@@ -87,7 +87,7 @@ class AdvanceIsland(Job[Advanced]):
     island: int
 
     def do(self, programs: Programs, recipe: Recipe) -> Advanced:
-        """See `Job`. The state is packed without the row axis, as in a run's checkpoint."""
+        """The state is packed without the row axis, as in a run's checkpoint."""
         batch = programs.batch(recipe)
         one = batch.experiments[0]
         begun = self.state and self.state.state(one.abstract(), "an island's state")

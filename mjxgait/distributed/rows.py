@@ -161,7 +161,7 @@ class ChunkedEvaluator:
         settings: Config,
         asked: RequestedTrials | None = None,
     ) -> Evaluation:
-        """See `Evaluator`. Takes one row; its settings are in the recipe."""
+        """Takes one row; its settings are in the recipe."""
         genomes, trials, asked = jax.device_get((genomes, trials, asked))
         return together(self._scheduler.all(self._work(genomes, trials, asked)) or ())
 

@@ -70,11 +70,11 @@ class MjxPlant:
         return dataclasses.replace(self, parameters=parameters)
 
     def with_mass_scale(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
-        """See `Plant.heavier`."""
+        """See `Plant.with_mass_scale`."""
         return reweighed(self.model, self.data, with_mass_scale(parameters, factor))
 
     def with_length_scale(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
-        """See `Plant.resized`."""
+        """See `Plant.with_length_scale`."""
         large = with_length_scale(self.model, self.layout, self.crossings, parameters, factor)
         return reweighed(self.model, self.data, large)
 

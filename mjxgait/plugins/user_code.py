@@ -30,7 +30,7 @@ from mjxgait.reference.controllers import Command, Memory
 
 
 class SameCode:
-    """See `ReferenceController`. The memory's arrays are numbered."""
+    """Implementation of `ReferenceController`. The memory's arrays are numbered."""
 
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
         part: Any = find("controller", champion.controller)
@@ -57,7 +57,10 @@ class SameCode:
         return {str(i): np.repeat(leaf[None], count, axis=0) for i, leaf in enumerate(leaves)}
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
-        """See `ReferenceController`. Padded to a power of two, so that few programs are compiled."""
+        """Command of all individuals.
+
+        Their number is padded to a power of two, so that few programs are compiled.
+        """
         count = len(senses["time"])
         padding = (1 << (count - 1).bit_length()) - count
 
@@ -72,7 +75,7 @@ class SameCode:
         return np.asarray(command, float)[:count], {str(i): leaf for i, leaf in enumerate(kept)}
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `ReferenceController`: NaN, because the controller may have no cycle."""
+        """Return NaN, because the controller may have no cycle."""
         count = len(next(iter(memory.values()))) if memory else 1
         return np.full(count, np.nan)
 

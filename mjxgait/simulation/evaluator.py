@@ -45,7 +45,7 @@ class Local:
         settings: Config,
         asked: RequestedTrials | None = None,
     ) -> Evaluation:
-        """See `Evaluator`. Outside the simulations, each row reads only its own data."""
+        """Outside the simulations, each row reads only its own data."""
         wanted = None if asked is None else jnp.asarray(asked.wanted)
         episodes = self.simulator.simulate(genomes, trials, settings, wanted)
         lived = jnp.sum(episodes.stats.steps, axis=(1, 2))

@@ -41,7 +41,7 @@ class PlainTask(abc.ABC):
         return tuple(self.counts)
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the first start is nominal, the others are perturbed and pushed."""
+        """The first start is nominal, the others are perturbed and pushed."""
         return draw_starts(key, creature, settings)
 
     @property
@@ -54,7 +54,7 @@ class PlainTask(abc.ABC):
         return 0
 
     def at_level(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
-        """See `Task`: always the same."""
+        """Return the trials unchanged."""
         return trials
 
     def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
@@ -74,7 +74,7 @@ class PlainTask(abc.ABC):
         return {}
 
     def next_goal(self, goal: Any, sensed: Sensed) -> Any:
-        """See `Task`: the same."""
+        """Keep the goal."""
         return goal
 
     def init(self) -> EpisodeStats:
@@ -83,11 +83,11 @@ class PlainTask(abc.ABC):
         return EpisodeStats(steps=none, reason=none, overlap=jnp.zeros(()))
 
     def ended(self, sensed: Sensed, goal: Any) -> jax.Array:
-        """See `Task`: a fall ends the episode."""
+        """A fall ends the episode."""
         return why_fallen(self.creature, self.ends, sensed)
 
     def update(self, stats: Any, sensed: Sensed, torque: jax.Array, params: Any, goal: Any) -> Any:
-        """See `Task`: one more step."""
+        """Count one more step."""
         return dataclasses.replace(stats, steps=stats.steps + 1)
 
     @abc.abstractmethod
@@ -103,7 +103,7 @@ class PlainTask(abc.ABC):
         return ()
 
     def outcome(self, stats: Any) -> Mapping[str, jax.Array]:
-        """See `Task`: s until the end."""
+        """Time in s until the end."""
         return {"seconds": stats.steps * self.step}
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:

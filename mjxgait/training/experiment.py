@@ -79,7 +79,7 @@ class Experiment:
 
     @cached_property
     def simulator(self) -> Simulator:
-        """See `ModelSpec.own`."""
+        """See `SimulatorSpec.own`."""
         return self.spec.own
 
     @property

@@ -55,7 +55,7 @@ class GraphGrowth(Growth[TreePlant, Genotype]):
     capacity: Capacity
 
     def body(self, plant: TreePlant, genome: Genotype, start: Starts) -> Starts:
-        """See `Growth`. Parts without a hinge are not bent; on land bodies rest on the ground."""
+        """Parts without a hinge are not bent; on land bodies rest on the ground."""
         tree = body_of(genome.graph, self.capacity).tree
         bent = start.qpos[7:] * tree.moves[1:]
         qpos = plant.rested(tree, jnp.concatenate([start.qpos[:7], bent]))
@@ -196,7 +196,10 @@ class ModelSpec:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class GrownSpec:
-    """See `SimulatorSpec`; every genome grows its own body. creature: gives settings and time step only."""
+    """Implementation of `SimulatorSpec`.
+
+    Every genome grows its own body. creature: gives settings and time step only.
+    """
 
     creature: Creature
     config: Config

@@ -187,7 +187,7 @@ def compile_stages(
 def begin(
     spec: SimulatorSpec, numbers: BodyParams | None, settings: Config, key: jax.Array
 ) -> EvolutionState:
-    """See `first_state`. All runs, single or in a batch, share one compiled function: they begin
+    """All runs, single or in a batch, share one compiled function: they begin
     with the same bits.
     """
     return _beginning()(spec, numbers, settings, key)
@@ -201,5 +201,5 @@ def _beginning() -> Callable[..., EvolutionState]:
 
 
 def embodied(spec: SimulatorSpec, starts: Starts) -> Starts:
-    """See `SimulatorSpec.embodied`. Jitted, or each of its hundreds of operations is compiled alone."""
+    """Jitted, or each of its hundreds of operations is compiled alone."""
     return jax.jit(spec.embodied)(starts)

@@ -219,7 +219,7 @@ class TreePlant(Plant[Moment]):
         return jnp.stack(one_kernel(_solve_damped)(step_data.mass, damping, force))
 
     def overlap(self, state: BodyState) -> jax.Array:
-        """See `Plant.overlap`; any pose counts, because these bodies have no drawn pose."""
+        """Any pose counts, because these bodies have no drawn pose."""
         tree: Tree = state.parameters
         return deepest(tree, posture(tree, state.qpos, pinned_by(state.friction)))
 

@@ -112,7 +112,7 @@ class FastPlant:
         return dataclasses.replace(self, parameters=parameters)
 
     def with_mass_scale(self, parameters: Parameters, factor: Number) -> Parameters:
-        """See `Plant.heavier`."""
+        """See `Plant.with_mass_scale`."""
         factor = self._of_moving(factor)
         heavy = dataclasses.replace(
             parameters,
@@ -122,7 +122,7 @@ class FastPlant:
         return self._reweighed(parameters, heavy)
 
     def with_length_scale(self, parameters: Parameters, factor: Number) -> Parameters:
-        """See `Plant.resized`."""
+        """See `Plant.with_length_scale`."""
         large = with_length_scale(self.topology, parameters, self._of_moving(factor))
         return self._reweighed(parameters, large)
 

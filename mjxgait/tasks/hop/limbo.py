@@ -76,7 +76,7 @@ class Goal:
 
 @pytree
 class EpisodeStats(hop.EpisodeStats):
-    """See `hop.EpisodeStats`.
+    """Extension of `hop.EpisodeStats`.
 
     bar: [] m, greatest depth in the bar at its final height.
     raised: [] m of it that cost nothing yet.
@@ -90,7 +90,7 @@ class EpisodeStats(hop.EpisodeStats):
 
 @pytree
 class TaskParams(hop.TaskParams):
-    """See `hop.Standards`. height: [] m, of the bar."""
+    """Extension of `hop.TaskParams`. height: [] m, of the bar."""
 
     height: jax.Array
 
@@ -121,13 +121,13 @@ class Limbo(Hop):
         return steps
 
     def at_level(self, trials: Starts, settings: LimboConfig, level: jax.Array) -> Starts:
-        """See `Task`: the bar comes down, so that hoppers learn to duck little by little."""
+        """The bar comes down, so that hoppers learn to duck little by little."""
         left = 1.0 - ramped(settings.lowering, level)
         raised = jnp.full(trials.friction.shape, settings.higher * left)
         return dataclasses.replace(trials, goal=Goal(trials.goal.ahead, raised))
 
     def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
-        """See `Task`: at the goal in the end, and hardly in the bar."""
+        """At the goal in the end, and hardly in the bar."""
         return (terms[MISSED] <= THERE) & (terms["bar"] <= BENEATH)
 
     @override
@@ -163,7 +163,7 @@ class Limbo(Hop):
         return fitness_terms(self.creature, self.horizon, stats, {"bar": bar})
 
     def outcome(self, stats: Any) -> dict[str, jax.Array]:
-        """See `Task`: as for hopping, and the height in m of a bar that would just be cleared.
+        """Metrics of a hop, and the height in m of a bar that would just be cleared.
 
         It is at least the height of the bar itself.
         """

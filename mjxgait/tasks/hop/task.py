@@ -72,7 +72,7 @@ class Hop(PlainTask):
         return self.settings.sub_goals if "sub_goals" in self.terms else ()
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the usual starts, each with its goal [] in m ahead; the first is nominal."""
+        """The usual starts, each with its goal [] in m ahead; the first is nominal."""
         starts = draw_starts(key, creature, settings)
         low, high = self.goals
         # A separate key keeps the starts the same as those of every other task.
@@ -81,7 +81,7 @@ class Hop(PlainTask):
         return dataclasses.replace(starts, goal=goals)
 
     def goal(self, trial: Starts) -> jax.Array:
-        """See `Task`: the goal [] in m ahead of the start."""
+        """The goal [] in m ahead of the start."""
         return jnp.asarray(trial.goal)
 
     @override
@@ -115,7 +115,7 @@ class Hop(PlainTask):
         return fitness_terms(self.creature, self.horizon, stats)
 
     def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
-        """See `Task`: final distance in m and in goal distances; s to the arrival and the end."""
+        """Final distance in m and in goal distances; s to the arrival and the end."""
         left = away(stats)
         return {
             "left": left,
@@ -131,7 +131,7 @@ class Hop(PlainTask):
 
 @pytree
 class TravelStats(hop.EpisodeStats):
-    """See `hop.EpisodeStats`; goal is the latest. reached: [] goals."""
+    """Extension of `hop.EpisodeStats`; goal is the latest. reached: [] goals."""
 
     reached: jax.Array
 
@@ -154,12 +154,12 @@ class Travel(Hop):
     outcomes = ("goals", "way", "seconds")
 
     def goal(self, trial: Starts) -> Any:
-        """See `Task`: the distance to the first goal is also the spacing of all others."""
+        """The distance to the first goal is also the spacing of all others."""
         goal = jnp.asarray(trial.goal)
         return Goal(goal, goal)
 
     def next_goal(self, goal: Goal, sensed: Sensed) -> Goal:
-        """See `Task`: a goal that is near, or passed, moves on."""
+        """A goal that is near, or passed, moves on."""
         left = hop.goal_distance(self.creature, goal.ahead, sensed)
         reached = left <= NEAR * goal.spacing
         return dataclasses.replace(goal, ahead=goal.ahead + jnp.where(reached, goal.spacing, 0.0))
@@ -181,14 +181,14 @@ class Travel(Hop):
         return dataclasses.replace(after, reached=reached)
 
     def evaluate(self, stats: EpisodeStats, settings: object) -> dict[str, jax.Array]:
-        """See `Task`: style counts in proportion to the share of the way to the nominal goal."""
+        """Style counts in proportion to the share of the way to the nominal goal."""
         way = self._way(stats) / NOMINAL_GOAL
         style = style_terms(self.creature, self.horizon, stats)
         near = jnp.clip(way, 0.0, 1.0)
         return {GOAL: 1.0 - way} | {n: near * style[n] for n in self.terms if n != GOAL}
 
     def outcome(self, stats: Any) -> dict[str, jax.Array]:
-        """See `Task`: goals reached, m ahead of the start, s until the end."""
+        """Goals reached, m ahead of the start, s until the end."""
         return {
             "goals": stats.reached.astype(jnp.float32),
             "way": self._way(stats),

@@ -22,7 +22,7 @@ from mjxgait.types import Sensed
 
 
 class Following(GoingTask):
-    """See `Task`: base class for following in water and on land.
+    """Implementation of `Task`: base class for following in water and on land.
 
     The way is the decrease of the distance to the light.
     """
@@ -32,7 +32,7 @@ class Following(GoingTask):
     dark = np.zeros(3, np.float32)
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the first light is ahead, and in each round the others are elsewhere.
+        """The first light is ahead, and in each round the others are elsewhere.
 
         The lights of a round cancel out with the one ahead: moving straight on gains as much on
         some as it loses on the others.
@@ -45,11 +45,11 @@ class Following(GoingTask):
         return dataclasses.replace(super().trials(key, creature, settings), goal=lights)
 
     def goal(self, trial: Starts) -> jax.Array:
-        """See `Task`: place [3] of the light in m; the trial has it from where the root starts."""
+        """Place [3] of the light in m; the trial has it from where the root starts."""
         return jnp.asarray(trial.qpos[:3] + trial.goal)
 
     def observations(self, goal: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
-        """See `Task`: direction [G, 3] of the light in the axes of each block."""
+        """Direction [G, 3] of the light in the axes of each block."""
         axes = own(sensed).geom_rot
         assert axes is not None
         there = goal - sensed.geom_pos
@@ -71,16 +71,16 @@ class Following(GoingTask):
         return before - now
 
     def outcome(self, stats: Any) -> Mapping[str, jax.Array]:
-        """See `Task`: also the time in s from which the way counted."""
+        """Also the time in s from which the way counted."""
         return {**super().outcome(stats), "since": stats.since * self.step}
 
 
 class FollowInWater(Following, Swim):
-    """See `Task`."""
+    """Implementation of `Task`."""
 
 
 class FollowOnLand(Following, Roam):
-    """See `Task`."""
+    """Implementation of `Task`."""
 
 
 def balanced(key: jax.Array, count: int, axes: int) -> jax.Array:

@@ -48,7 +48,7 @@ def own(sensed: Sensed) -> ModularSensed:
 
 @pytree
 class EpisodeStats(protocol.EpisodeStats):
-    """See `protocol.EpisodeStats`.
+    """Extension of `protocol.EpisodeStats`.
 
     settled, place: [3] m, centre of mass when counting began, and now.
     light: [3] m, its place. since: [] step from which the way counts. None without a light.
@@ -61,10 +61,13 @@ class EpisodeStats(protocol.EpisodeStats):
 
 
 class BlocksTask(PlainTask):
-    """See `Task`: the creature lies at rest, with bent joints in all trials but the first."""
+    """Implementation of `Task`.
+
+    The creature lies at rest, with bent joints in all trials but the first.
+    """
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`. The root is at the origin; growing the body puts it on the ground."""
+        """The root is at the origin; growing the body puts it on the ground."""
         count, joints = settings.starts, len(self.creature.joints.names)
         bent = settings.joint_noise * jax.random.uniform(key, (count, joints), minval=-1.0)
         bent = bent * (jnp.arange(count) > 0)[:, None]
@@ -81,7 +84,7 @@ class BlocksTask(PlainTask):
         )
 
     def params(self, settings: BlocksConfig) -> jax.Array:
-        """See `Task`: the first step [] that counts."""
+        """The first step [] that counts."""
         return jnp.round(settings.settle / self.step).astype(jnp.int32)
 
     @override
@@ -91,7 +94,7 @@ class BlocksTask(PlainTask):
         return jnp.where(wild | (own(sensed).limit_excess > FURTHEST), WILD, FINISHED)
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
-        """See `Task`: the first term is a reward, all others are penalties.
+        """The first term is a reward, all others are penalties.
 
         The weight of the overlap grows over the generations.
         """
@@ -103,7 +106,7 @@ class BlocksTask(PlainTask):
 
 
 class GoingTask(BlocksTask):
-    """See `Task`: get as far as possible.
+    """Implementation of `Task`: get as far as possible.
 
     axes: number of world axes along which a way counts. dark: light of the empty statistics.
     """
@@ -132,7 +135,7 @@ class GoingTask(BlocksTask):
     def update(
         self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> Any:
-        """See `Task`: the place now, and when counting began."""
+        """The place now, and when counting began."""
         return dataclasses.replace(
             stats,
             steps=stats.steps + 1,
@@ -145,7 +148,7 @@ class GoingTask(BlocksTask):
         return self.way(stats) / jnp.maximum(self.horizon * self.step - settings.settle, self.step)
 
     def outcome(self, stats: EpisodeStats) -> Mapping[str, jax.Array]:
-        """See `Task`: m from where counting began, and s until the end."""
+        """Distance in m from where counting began, and s until the end."""
         return {"way": self.way(stats), "seconds": stats.steps * self.step}
 
 
@@ -165,7 +168,7 @@ LITTLE = 1e-6
 
 @pytree
 class SwimStats(EpisodeStats):
-    """See `alive.EpisodeStats`.
+    """Extension of `alive.EpisodeStats`.
 
     began: [3] kg·m/s, momentum of the body when counting began.
     given: [3] kg·m/s, from the water since then. exchanged: [] the same without directions.
@@ -179,7 +182,7 @@ class SwimStats(EpisodeStats):
 
 
 class Swim(GoingTask):
-    """See `Task`: in water, without a floor. The way is a straight line."""
+    """Implementation of `Task`: in water, without a floor. The way is a straight line."""
 
     Settings: ClassVar[type] = SwimConfig
     terms = tuple(field.name for field in dataclasses.fields(SwimWeights))
@@ -214,7 +217,7 @@ class Swim(GoingTask):
         )
 
     def evaluate(self, stats: SwimStats, settings: SwimConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: the speed; its loss by overlap; the loss of the rest by foreign momentum."""
+        """The speed; its loss by overlap; the loss of the rest by foreign momentum."""
         speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
         inside = lost(stats.overlap / settings.overlap)
@@ -225,7 +228,7 @@ class Swim(GoingTask):
 
 @pytree
 class RoamStats(EpisodeStats):
-    """See `alive.EpisodeStats`.
+    """Extension of `alive.EpisodeStats`.
 
     upwards: [3] direction in the root's axes that was up when counting began.
     upright: [] least cosine of its angle with the world's up axis since then.
@@ -236,7 +239,7 @@ class RoamStats(EpisodeStats):
 
 
 class Roam(GoingTask):
-    """See `Task`: on land. The way is a straight, level line."""
+    """Implementation of `Task`: on land. The way is a straight, level line."""
 
     Settings: ClassVar[type] = RoamConfig
     terms = tuple(field.name for field in dataclasses.fields(RoamWeights))
@@ -261,7 +264,7 @@ class Roam(GoingTask):
         )
 
     def evaluate(self, stats: RoamStats, settings: RoamConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: the speed; its loss by overlap; the loss of the rest by tipping over.
+        """The speed; its loss by overlap; the loss of the rest by tipping over.
 
         Blocks overlap each other or the ground.
         """
@@ -291,13 +294,16 @@ in the trial that it was selected by.
 
 @pytree
 class JumpStats(protocol.EpisodeStats):
-    """See `protocol.EpisodeStats`. heights: [SPANS] m, greatest height of the lowest part in each."""
+    """Extension of `protocol.EpisodeStats`.
+
+    heights: [SPANS] m, greatest height of the lowest part in each.
+    """
 
     heights: jax.Array
 
 
 class Jump(BlocksTask):
-    """See `Task`: on land."""
+    """Implementation of `Task`: on land."""
 
     Settings: ClassVar[type] = JumpConfig
     terms = tuple(field.name for field in dataclasses.fields(JumpWeights))
@@ -323,7 +329,7 @@ class Jump(BlocksTask):
         )
 
     def evaluate(self, stats: JumpStats, settings: JumpConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: m; its loss by overlap; the loss of the rest by an early end.
+        """Height in m; its loss by overlap; the loss of the rest by an early end.
 
         Blocks overlap each other or the ground. An early end costs, because the wildest leap is the
         last.
@@ -338,5 +344,5 @@ class Jump(BlocksTask):
         }
 
     def outcome(self, stats: JumpStats) -> Mapping[str, jax.Array]:
-        """See `Task`: m, and s until the end."""
+        """Height in m, and s until the end."""
         return {"height": jnp.mean(stats.heights), "seconds": stats.steps * self.step}

@@ -73,7 +73,7 @@ The range allows for standing at the start.
 
 
 class WalkCriteria(StaysUp):
-    """See `AcceptanceCriteria`: steady forward strides, like those of an animal."""
+    """Implementation of `AcceptanceCriteria`: steady forward strides, like those of an animal."""
 
     verdict = "it walks"
     revision = 1
@@ -101,13 +101,13 @@ class WalkCriteria(StaysUp):
     def obeyed(
         self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: 11."""
+        """Evaluate criterion 11."""
         return (steered(outcome, commanded, config.wishes),)
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: all but 4 and 5, and 10 if targets are set."""
+        """Evaluate all criteria but 4 and 5, and 10 if targets are set."""
         config = following(config, self.wish, whole.dimensions)
         whole, halved = (unrolled(recording, self.wish) for recording in (whole, halved))
         window = whole.window(config.warmup)
@@ -134,7 +134,7 @@ class WalkCriteria(StaysUp):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `AcceptanceCriteria`: no early end, and clearly faster than required, or near a target speed."""
+        """No early end, and clearly faster than required, or near a target speed."""
         lived = to_the_end(outcome, seconds, creature)
         if "speed" in self.wish:
             came = outcome["forward"] / seconds / self.wish["speed"]

@@ -271,7 +271,7 @@ def gait_missed(
 
 @pytree
 class TargetStats(EpisodeStats):
-    """See `EpisodeStats`.
+    """Extension of `EpisodeStats`.
 
     falls: the footfalls.
     height, height_squared: [] m·steps, m²·steps of the trunk.

@@ -82,11 +82,11 @@ class Walk(PlainTask):
         return settings.hardening
 
     def at_level(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
-        """See `Task`: disturbances grow, so that individuals learn to withstand them bit by bit."""
+        """Disturbances grow, so that individuals learn to withstand them bit by bit."""
         return milder(trials, hardness(settings.hardening, level))
 
     def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
-        """See `Task`: hardly any falls."""
+        """Hardly any falls."""
         return terms["fall"] <= FALLEN
 
     @property
@@ -94,7 +94,7 @@ class Walk(PlainTask):
         return StatsRecorder(self.creature, self.step, self.horizon // 2, self.settings.contact)
 
     def params(self, settings: WalkConfig) -> jax.Array:
-        """See `Task`: the wanted clearance [] of each swing in m."""
+        """The wanted clearance [] of each swing in m."""
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
     @override
@@ -112,7 +112,7 @@ class Walk(PlainTask):
         return fitness_terms(self.creature, settings, self.step, self.horizon, stats)
 
     def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
-        """See `Task`: m forward, m to the left and s until the end."""
+        """Distance in m forward and to the left, and s until the end."""
         return {
             "forward": stats.forward,
             "aside": stats.left,
@@ -142,7 +142,7 @@ class TargetedWalk(Walk):
         return (*super().terms, *target_weights(self.wish))
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the usual initial conditions, and the rate [R] of the commanded turn in
+        """The usual initial conditions, and the rate [R] of the commanded turn in
         rad/s.
 
         With `turn`, all have the target rate. With `steer`, the first goes straight; the others
@@ -160,7 +160,7 @@ class TargetedWalk(Walk):
         return dataclasses.replace(starts, goal=jnp.radians(rate))
 
     def goal(self, trial: Starts) -> Heading:
-        """See `Task`: the commanded heading [] in rad, and its change per step."""
+        """The commanded heading [] in rad, and its change per step."""
         if trial.goal is None:
             return ()
         return jnp.zeros(()), trial.goal * self.step
@@ -170,7 +170,7 @@ class TargetedWalk(Walk):
         return (goal[0] + goal[1], goal[1]) if goal else goal
 
     def observations(self, goal: Heading, sensed: Sensed) -> dict[str, jax.Array]:
-        """See `Task`: with a commanded heading there is no line to return to."""
+        """With a commanded heading there is no line to return to."""
         if not goal:
             return {}
         heading = sense(self.creature, sensed, jnp.zeros(()), ["heading"])["heading"]
