@@ -1,6 +1,5 @@
 """Whole runs as rows of one program, and one large population in chunks."""
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
@@ -16,8 +15,7 @@ from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.checkpoint import Checkpoints, Packed, side_by_side
-from mjxgait.training.folder import METRICS, open_run, truncate_metrics
-from mjxgait.training.stored import disk_errors
+from mjxgait.training.folder import METRICS, append_lines, open_run, truncate_metrics
 from mjxgait.types import Evaluation, RequestedTrials
 
 Tell = Callable[[int, int, Advanced | None], object]
@@ -122,10 +120,7 @@ class Rows:
         state: Packed,
         lines: Lines,
     ) -> None:
-        """Write the log first, since a resumed run can remove its lines, and the state last."""
-        path = folder / METRICS
-        with disk_errors(folder), path.open("a", encoding="utf-8") as log:
-            log.writelines(json.dumps(line) + "\n" for line in lines)
+        append_lines(folder / METRICS, lines)
         stores[folder].keep(state, self.creature.name, self.creature.digest)
 
 

@@ -37,6 +37,7 @@ from mjxgait.training.folder import (
     MOTHERS,
     STRESS,
     Line,
+    append_lines,
     keep_body,
     kept_champion,
     read_metrics,
@@ -222,9 +223,7 @@ def _generation(
         return state
     line = metrics_line(metrics, time.perf_counter() - began, experiment.simulator.task)
     line |= followed(experiment.simulator.controller.numbers(state.genomes))
-    # The log first: a kill before the checkpoint leaves an extra line, which a resumed run removes.
-    with disk_errors(folder), (folder / METRICS).open("a", encoding="utf-8") as log:
-        log.write(json.dumps(line) + "\n")
+    append_lines(folder / METRICS, [line])
     if np.isfinite(metrics.best):
         with disk_errors(folder):
             write_champion(

@@ -6,7 +6,6 @@ C MuJoCo evaluates all variants alike, whatever fitness they evolved for.
 import contextlib
 import dataclasses
 import functools
-import json
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -34,6 +33,7 @@ from mjxgait.training.folder import (
     CREATURE,
     METRICS,
     Line,
+    append_lines,
     read_metrics,
     read_records,
     truncate_metrics,
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from jax.tree_util import PyTreeDef
 
 GROUPS, CHAMPIONS = "groups", "champions"
+TIMES = ("wall_s", "steps_per_second")
+"""Metrics that the log of a study leaves out."""
 
 
 class News(TypedDict, total=False):
@@ -195,15 +197,18 @@ class _Group:
 
         Wall time is left out: the rows share it, and it is never the same twice.
         """
-        with disk_errors(self.folder), (self.folder / METRICS).open("a", encoding="utf-8") as log:
-            for run, line in zip(self.runs, lines, strict=True):
-                if line["generation"] <= run.generations:
-                    kept = {
-                        key: value
-                        for key, value in line.items()
-                        if key not in ("wall_s", "steps_per_second")
-                    }
-                    log.write(json.dumps({"variant": run.variant, "seed": run.seed, **kept}) + "\n")
+        append_lines(
+            self.folder / METRICS,
+            (
+                {"variant": run.variant, "seed": run.seed, **_without(line, TIMES)}
+                for run, line in zip(self.runs, lines, strict=True)
+                if line["generation"] <= run.generations
+            ),
+        )
+
+
+def _without(line: Line, names: Sequence[str]) -> Line:
+    return {name: value for name, value in line.items() if name not in names}
 
 
 MEASURED = "measured.jsonl"
@@ -293,8 +298,7 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
         for number, (run, evaluation) in enumerate(zip(missing, found, strict=True), 1):
             result = _result(plan.study, run, lines[run.variant, run.seed], evaluation)
             known[result.variant, result.seed] = result
-            with disk_errors(folder), (folder / MEASURED).open("a", encoding="utf-8") as log:
-                log.write(json.dumps(dataclasses.asdict(result)) + "\n")
+            append_lines(folder / MEASURED, [dataclasses.asdict(result)])
             tell(number, len(missing))
     return [known[run.variant, run.seed] for run in plan.runs]
 
