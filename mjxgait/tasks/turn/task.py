@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from typing_extensions import override
 
 from mjxgait.config.tables import STRICT, Positive
-from mjxgait.tasks.base import EpisodeStats, positive_work
+from mjxgait.tasks.base import EpisodeStats, crossed, positive_work
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.types import Sensed, pytree
 
@@ -49,6 +49,7 @@ class Turn(PlainTask):
         "turned": 3.0,
         "away": -1.0,
         "work": -0.05,
+        "overlap": -4.0,
     }
     outcomes = ("seconds", "turned", "away")
 
@@ -90,6 +91,7 @@ class Turn(PlainTask):
             "turned": jnp.clip(rate / settings.rate, -1.0, 1.0),
             "away": stats.away / (frame.hip_height * seconds),
             "work": stats.work / weight_lifted,
+            "overlap": crossed(self.creature, stats.overlap),
         }
 
     @override

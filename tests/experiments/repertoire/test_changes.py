@@ -27,14 +27,15 @@ from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.walk import record_walk
 
 LARGE, SMALL = 35.0, 30.0
-MOMENTS = 3
-"""Moments of change; the shipped value is larger, and each is simulated for 13 s."""
+MOMENTS, SETTLES, WATCHED = 2, 2.0, 2.0
+"""Moments of change, and s after it; the shipped values are larger."""
 CHANGES = np.array([1.0, 1.5, np.inf])
 
 
 @pytest.fixture(autouse=True)
 def few_moments(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(neighbours, "MOMENTS", MOMENTS)
+    for name, value in (("MOMENTS", MOMENTS), ("SETTLES", SETTLES), ("WATCHED", WATCHED)):
+        monkeypatch.setattr(neighbours, name, value)
 
 
 def one_by_one(work: Callable, ways: Sequence, tell: Callable[[int, int], object], **_) -> list:
@@ -58,7 +59,7 @@ def film(creature: Creature, before: Champion, after: Champion, seconds: float =
 
 def walking_at(creature: Creature, champion: Champion, share: float = 1.0) -> Champion:
     """The champion with a share of its own speed as its target."""
-    walk = record_walk(creature, champion, 8.0)
+    walk = record_walk(creature, champion, 6.0)
     chords = walk.qpos[200:, :2] - walk.qpos[:-200, :2]
     speed = float(np.linalg.norm(chords[-1000:], axis=1).mean())
     return dataclasses.replace(champion, wish={"speed": share * speed})

@@ -49,6 +49,15 @@ def test_an_early_end_loses_the_remaining_turn(stool: Creature):
     assert (whole["alive"], half["alive"]) == (1.0, 0.5)
 
 
+def test_parts_in_each_other_are_penalized(stool: Creature):
+    """A crab without this term turned with its legs in its trunk, and failed criterion 9."""
+    task, stats, plain = episode(stool)
+    deep = dataclasses.replace(stats, overlap=jnp.float32(0.2 * stool.frame.hip_height))
+    assert plain["overlap"] == 0.0
+    assert 0.5 < task.evaluate(deep, TurnSettings())["overlap"] < 1.0
+    assert task.weights(TurnSettings(), jnp.int32(0))["overlap"] == -4.0
+
+
 def test_distance_from_the_start_is_penalized(stool: Creature):
     """Averaged over the episode, in hip heights."""
     mean = np.mean(0.3 * STEP * np.arange(STEPS))
