@@ -172,7 +172,7 @@ def made_up_evaluate(
     settings: Config,
     starts: Starts,
     genomes: Any,
-    asked: RequestedTrials | None = None,
+    requested: RequestedTrials | None = None,
 ) -> Evaluation:
     """Replacement of `training.stages.evaluate` that simulates nothing and compiles fast.
 
@@ -183,7 +183,7 @@ def made_up_evaluate(
     shape = (*poses.shape[:2], starts.friction.shape[1])
     worth = -jnp.asarray(settings.fitness.speed)[:, None] * jnp.square(poses).sum((2, 3))
     worth = worth[..., None, None] * starts.friction[:, None, :, None]
-    wanted = jnp.ones(shape, bool) if asked is None else jnp.asarray(asked.wanted)
+    wanted = jnp.ones(shape, bool) if requested is None else jnp.asarray(requested.wanted)
     lived = jnp.sum(wanted, axis=(1, 2), dtype=jnp.int32)
     evaluation = Evaluation(
         terms=jnp.tile(worth, len(task.terms)),
@@ -192,4 +192,4 @@ def made_up_evaluate(
         sim_steps=lived,
         computed_steps=lived,
     )
-    return evaluation if asked is None else completed(evaluation, asked)
+    return evaluation if requested is None else completed(evaluation, requested)

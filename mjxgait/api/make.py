@@ -100,7 +100,7 @@ def train(
 
     use = _use(controller=controller, task=task)
     creature = load_creature(env, scale, way=way)
-    asked = {
+    requested = {
         "speed": speed,
         "gait": gait,
         "turn": turn,
@@ -109,7 +109,7 @@ def train(
         "certificate": certificate,
     }
     file = Path(config) if config else None
-    resolved = configured(creature, file, use, WalkTargets.of(asked))
+    resolved = configured(creature, file, use, WalkTargets.of(requested))
     short = {"population": population, "generations": generations}
     evolution = {key: value for key, value in short.items() if value is not None}
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})

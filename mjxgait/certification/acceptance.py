@@ -41,7 +41,7 @@ class AcceptanceCriteria(Protocol):
     worth: float
     """Least share of successful trials in evolution for an individual to be worth validating."""
 
-    def asked(self, wish: Wish) -> "AcceptanceCriteria":
+    def with_targets(self, wish: Wish) -> "AcceptanceCriteria":
         """Return the criteria with those of the requested targets, by name."""
         ...
 
@@ -143,7 +143,7 @@ class Unasked:
 
     revision: int = 0
 
-    def asked(self, wish: Wish) -> Any:
+    def with_targets(self, wish: Wish) -> Any:
         """Return these criteria: targets add none."""
         return self
 
@@ -279,13 +279,13 @@ def acceptance_of(task: str, wish: Wish | None = None) -> AcceptanceCriteria:
     Raises:
       UserError: the task is user-defined code that was not named.
     """
-    return _made(task_kind(task)).asked(wish or {})
+    return _made(task_kind(task)).with_targets(wish or {})
 
 
 def how_simulated(task: str, wish: Wish | None = None) -> AcceptanceCriteria | StaysUp:
     """Return a task's goals, falls and turns for a simulation; the usual ones if it is unknown."""
     kind = known_task(task)
-    return (_made(kind) if kind else StaysUp()).asked(wish or {})
+    return (_made(kind) if kind else StaysUp()).with_targets(wish or {})
 
 
 @functools.cache

@@ -271,9 +271,9 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
         given, _ = early.parse_known_args(list(arguments))
     except argparse.ArgumentError as error:
         raise UserError(str(error)) from None
-    asked = {name: getattr(given, name) for name in TARGETS}
+    requested = {name: getattr(given, name) for name in TARGETS}
     if given.resume:
-        if any(asked.values()):
+        if any(requested.values()):
             raise UserError(
                 f"{given.resume}: a resumed run keeps its settings; other targets need a new run"
             )
@@ -285,7 +285,7 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     file = Path(given.config) if given.config else None
     named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
     use = {kind: name for kind, name in named.items() if name}
-    return creature, configured(creature, file, use, WalkTargets.of(asked))
+    return creature, configured(creature, file, use, WalkTargets.of(requested))
 
 
 def _settings(options: TrainOptions) -> Config:

@@ -111,11 +111,13 @@ class Evaluate(Job[Evaluation]):
 
     genomes: object
     starts: Starts
-    asked: RequestedTrials | None = None
+    requested: RequestedTrials | None = None
 
     @override
     def do(self, programs: Programs, recipe: Recipe) -> Evaluation:
-        evaluation: Evaluation = programs.evaluate(recipe, self.genomes, self.starts, self.asked)
+        evaluation: Evaluation = programs.evaluate(
+            recipe, self.genomes, self.starts, self.requested
+        )
         return evaluation
 
 

@@ -128,20 +128,30 @@ class Programs:
         return batch.bound(self._stages.find(shape, lambda: batch.stages(turn=turn)))
 
     def evaluate(
-        self, recipe: Recipe, genomes: object, starts: Starts, asked: RequestedTrials | None = None
+        self,
+        recipe: Recipe,
+        genomes: object,
+        starts: Starts,
+        requested: RequestedTrials | None = None,
     ) -> Evaluation:
         """Evaluate genomes [1, N, ...], in NumPy."""
         shape, batch = self._known(recipe)
         count = jax.tree.leaves(genomes)[0].shape[1]
 
         def compile_it() -> jax.stages.Compiled:
-            program = batch.lower_evaluate(genomes, starts, asked)
+            program = batch.lower_evaluate(genomes, starts, requested)
             with self._turn(shape.name("evaluate", count)):
                 return compiled(program)
 
         program = self._evaluators.find((shape, count), compile_it)
         numbers, rows = batch.known
-        given = (numbers, rows.settings, starts, genomes, *([] if asked is None else [asked]))
+        given = (
+            numbers,
+            rows.settings,
+            starts,
+            genomes,
+            *([] if requested is None else [requested]),
+        )
         evaluation: Evaluation = jax.device_get(program(*given))
         return evaluation
 

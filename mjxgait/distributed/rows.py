@@ -154,14 +154,14 @@ class ChunkedEvaluator:
         genomes: object,
         trials: Starts,
         settings: Config,
-        asked: RequestedTrials | None = None,
+        requested: RequestedTrials | None = None,
     ) -> Evaluation:
         """Takes one row; its settings are in the recipe."""
-        genomes, trials, asked = jax.device_get((genomes, trials, asked))
-        return together(self._scheduler.all(self._work(genomes, trials, asked)) or ())
+        genomes, trials, requested = jax.device_get((genomes, trials, requested))
+        return together(self._scheduler.all(self._work(genomes, trials, requested)) or ())
 
     def _work(
-        self, genomes: object, trials: Starts, asked: RequestedTrials | None
+        self, genomes: object, trials: Starts, requested: RequestedTrials | None
     ) -> Iterator[tuple[Recipe, Evaluate]]:
         count = jax.tree.leaves(genomes)[0].shape[1]
         for first in range(0, count, self.size):
@@ -171,7 +171,7 @@ class ChunkedEvaluator:
                 part = slice(first, first + self.size)
                 return leaf[:, part] if leaf.ndim > 1 else leaf * (first == 0)
 
-            block, known = jax.tree.map(cut, (genomes, asked))
+            block, known = jax.tree.map(cut, (genomes, requested))
             yield self._recipe, Evaluate(block, trials, known)
 
 

@@ -23,7 +23,7 @@ class Evaluator(Protocol):
         genomes: object,
         trials: Starts,
         settings: Config,
-        asked: RequestedTrials | None = None,
+        requested: RequestedTrials | None = None,
     ) -> Evaluation:
         """Return the results, leaves [B, N, ...], of genomes [B, N, ...] in the trials [B, R].
 
@@ -43,10 +43,10 @@ class Local:
         genomes: object,
         trials: Starts,
         settings: Config,
-        asked: RequestedTrials | None = None,
+        requested: RequestedTrials | None = None,
     ) -> Evaluation:
         """Outside the simulations, each row reads only its own data."""
-        wanted = None if asked is None else jnp.asarray(asked.wanted)
+        wanted = None if requested is None else jnp.asarray(requested.wanted)
         episodes = self.simulator.simulate(genomes, trials, settings, wanted)
         lived = jnp.sum(episodes.stats.steps, axis=(1, 2))
         # Idle lanes belong to no row: each row is charged in proportion to its own steps.
@@ -58,7 +58,7 @@ class Local:
             return self.verdict(settings, Episodes(stats, computed))
 
         evaluation = jax.lax.map(of_row, (settings, episodes.stats, computed))
-        return evaluation if asked is None else completed(evaluation, asked)
+        return evaluation if requested is None else completed(evaluation, requested)
 
     def verdict(self, settings: Config, episodes: Episodes) -> Evaluation:
         """Return the results of one row's episodes, statistics with leaves [N, R, ...]."""
@@ -79,17 +79,17 @@ class Local:
         )
 
 
-def completed(evaluation: Evaluation, asked: RequestedTrials) -> Evaluation:
+def completed(evaluation: Evaluation, requested: RequestedTrials) -> Evaluation:
     """Fill in the known results of the trials that were not run; all leaves [B, ...]."""
 
     def pick(new: jax.Array, known: jax.Array) -> jax.Array:
-        wanted = jnp.asarray(asked.wanted)
+        wanted = jnp.asarray(requested.wanted)
         return jnp.where(wanted.reshape(*wanted.shape, *[1] * (new.ndim - wanted.ndim)), new, known)
 
     return Evaluation(
-        terms=pick(evaluation.terms, asked.known.terms),
-        outcome=pick(evaluation.outcome, asked.known.outcome),
-        failed=pick(evaluation.failed, asked.known.failed),
-        sim_steps=evaluation.sim_steps + asked.known.sim_steps,
-        computed_steps=evaluation.computed_steps + asked.known.computed_steps,
+        terms=pick(evaluation.terms, requested.known.terms),
+        outcome=pick(evaluation.outcome, requested.known.outcome),
+        failed=pick(evaluation.failed, requested.known.failed),
+        sim_steps=evaluation.sim_steps + requested.known.sim_steps,
+        computed_steps=evaluation.computed_steps + requested.known.computed_steps,
     )

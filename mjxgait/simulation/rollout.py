@@ -290,13 +290,13 @@ class Simulator:
     def _command(self, k: jax.Array, lane: Lane, sensed: Sensed) -> tuple[jax.Array, object]:
         """Return the commands of a step, and the controllers' memories."""
 
-        def asked() -> tuple[jax.Array, object]:
+        def requested() -> tuple[jax.Array, object]:
             return self._per_lane(self._act)(lane, sensed)
 
         if not self._holds:
-            return asked()
+            return requested()
         due = k % self.controller.every == 0
-        return jax.lax.cond(due, asked, lambda: (lane.command, lane.memory))
+        return jax.lax.cond(due, requested, lambda: (lane.command, lane.memory))
 
     def _act(self, lane: Lane, sensed: Sensed) -> tuple[jax.Array, object]:
         """Return the controller's command [J] and its memory."""

@@ -240,11 +240,11 @@ class Batch:
         return partial(stages.step, *self.known, evaluator=evaluator)
 
     def lower_evaluate(
-        self, genomes: object, starts: Starts, asked: RequestedTrials | None = None
+        self, genomes: object, starts: Starts, requested: RequestedTrials | None = None
     ) -> jax.stages.Lowered:
         """Lower the program that evaluates genomes [B, N, ...]; see `generation.evaluate`."""
         given = (self.rows.settings, starts, genomes)
-        return lowered(self._spec, evaluate, *given, *([] if asked is None else [asked]))
+        return lowered(self._spec, evaluate, *given, *([] if requested is None else [requested]))
 
     @property
     def _spec(self) -> SimulatorSpec:

@@ -119,10 +119,10 @@ def evaluate(
     settings: Config,
     starts: Starts,
     genomes: object,
-    asked: RequestedTrials | None = None,
+    requested: RequestedTrials | None = None,
 ) -> Evaluation:
     """Evaluate genomes [B, N, ...] on this machine."""
-    return Local(spec.simulator(numbers)).evaluate(genomes, starts, settings, asked)
+    return Local(spec.simulator(numbers)).evaluate(genomes, starts, settings, requested)
 
 
 def first_trials(states: EvolutionState, proposals: Proposal) -> RequestedTrials:

@@ -110,12 +110,12 @@ class CompiledGeneration:
         """Run a generation of the rows [B]. evaluator: replaces this machine's program."""
         proposals, starts = self.propose(numbers, rows, states)
 
-        def verdict(*asked: RequestedTrials) -> Evaluation:
+        def verdict(*requested: RequestedTrials) -> Evaluation:
             if evaluator is not None:
-                return evaluator.evaluate(proposals.offspring, starts, rows.settings, *asked)
+                return evaluator.evaluate(proposals.offspring, starts, rows.settings, *requested)
             assert self.evaluate is not None, "compiled for an evaluator elsewhere"
             given = (numbers, rows.settings, starts, proposals.offspring)
-            found: Evaluation = self.evaluate(*given, *asked)
+            found: Evaluation = self.evaluate(*given, *requested)
             return found
 
         if self.promote is None:
@@ -152,8 +152,8 @@ def lower_stages(
     yield "propose", first
     proposals, starts = first.out_info
     promotes = rows.settings.rollout.promotes
-    asked = (first_trials(states, proposals),) if promotes else ()
-    given = (rows.settings, starts, proposals.offspring, *asked)
+    requested = (first_trials(states, proposals),) if promotes else ()
+    given = (rows.settings, starts, proposals.offspring, *requested)
     if evaluates:
         middle = lowered(spec, evaluate, *given)
         yield "evaluate", middle

@@ -139,8 +139,8 @@ def creatures_of(config: str) -> list[str]:
 
 def task_of(way: Way) -> str:
     """Return the task of a way of training, as a user types it."""
-    asked = way.task or read_config(way.config or "default").get("use", {}).get("task")
-    return asked or use_of(way.creature).task
+    requested = way.task or read_config(way.config or "default").get("use", {}).get("task")
+    return requested or use_of(way.creature).task
 
 
 def first_of_each_task(ways: Iterable[Way]) -> list[Way]:

@@ -102,8 +102,8 @@ def test_a_training_ends_with_a_certificate(way: Way, tmp_path: Path, capsys, to
     document = train(capsys, tmp_path / "run", *way.arguments)
     _, config = open_run(tmp_path / "run")
     told(way, config.use.task, document)
-    asked = way.task or (way.config and read_config(way.config).get("use", {}).get("task"))
-    task = asked or use_of(way.creature).task
+    requested = way.task or (way.config and read_config(way.config).get("use", {}).get("task"))
+    task = requested or use_of(way.creature).task
     if creature_of(way.creature).settings.creature.grows:
         task = meant_of_grown(task)
     assert config.use.task == document["task"] == task

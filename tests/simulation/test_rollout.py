@@ -230,9 +230,9 @@ def test_the_settings_decide_what_ends_an_episode(
     stool: Creature, settings: dict, ends: set[Reason]
 ):
     """Other settings come from the creature."""
-    asked = build_experiment(stool, small_config(rollout=settings))
+    requested = build_experiment(stool, small_config(rollout=settings))
     for reason, moment in WRONG.items():
-        assert reason_to_end(asked, **moment) == (reason if reason in ends else Reason.FINISHED)
+        assert reason_to_end(requested, **moment) == (reason if reason in ends else Reason.FINISHED)
 
 
 def test_without_termination_only_nonfinite_values_end_an_episode(stool: Creature):

@@ -91,13 +91,13 @@ class Looks:
 
     def __init__(self) -> None:
         self.glances, self.rehearsals, self.certificates = [0.3], [0.3], [0.3]
-        self.asked: list[str] = []
+        self.requested: list[str] = []
         self.wanted: list[float] = []
         self.cautions: list[float] = []
 
     def answer(self, kind: str, answers: list[float]) -> float:
-        self.asked.append(kind)
-        return answers[min(self.asked.count(kind), len(answers)) - 1]
+        self.requested.append(kind)
+        return answers[min(self.requested.count(kind), len(answers)) - 1]
 
 
 @pytest.fixture
@@ -158,13 +158,13 @@ def ranked(experiment: Experiment, generation: int = 9) -> EvolutionState:
 def test_a_promising_best_with_margin_is_certified_and_ends_the_run(experiment, looks, exams):
     examined = examiner(experiment, exams).early(state_with(experiment, 3))
     assert examined is not None
-    assert looks.asked == ["glance", "rehearsal", "exam"]
+    assert looks.requested == ["glance", "rehearsal", "exam"]
     assert examined.certificate.margin == pytest.approx(0.3)
     assert examined.champion.origin["generation"] == 3
 
 
 @pytest.mark.parametrize(
-    ("generation", "speed", "alive", "nominal_check", "rehearsal", "asked"),
+    ("generation", "speed", "alive", "nominal_check", "rehearsal", "requested"),
     [
         (4, 0.7, 1.0, 0.3, 0.3, 0),  # no validation is due
         (3, 0.55, 1.0, 0.3, 0.3, 0),  # hardly faster than required
@@ -174,12 +174,12 @@ def test_a_promising_best_with_margin_is_certified_and_ends_the_run(experiment, 
     ],
 )
 def test_otherwise_the_run_continues_without_further_checks(
-    experiment, looks, exams, generation, speed, alive, nominal_check, rehearsal, asked
+    experiment, looks, exams, generation, speed, alive, nominal_check, rehearsal, requested
 ):
     looks.glances, looks.rehearsals = [nominal_check], [rehearsal]
     state = state_with(experiment, generation, speed, alive)
     assert examiner(experiment, exams).early(state) is None
-    assert len(looks.asked) == asked
+    assert len(looks.requested) == requested
     assert exams.taken(9) == 0
 
 
@@ -188,7 +188,7 @@ def test_a_failed_candidate_is_not_validated_again(experiment, looks, exams):
     same = examiner(experiment, exams)
     for _ in range(2):
         assert same.early(state_with(experiment, 3)) is None
-    assert looks.asked == ["glance", "rehearsal"]
+    assert looks.requested == ["glance", "rehearsal"]
 
 
 def test_in_the_second_half_any_positive_margin_leads_to_an_attempt(experiment, looks, exams):
@@ -211,7 +211,7 @@ def test_a_failed_champion_is_not_retried_and_the_next_is_attempt_two(experiment
     assert examiner(experiment, exams).early(state_with(experiment, 3)) is None
     # A resumed run reads the failure from the file.
     assert examiner(experiment, exams).early(state_with(experiment, 6)) is None
-    assert looks.asked.count("exam") == 1
+    assert looks.requested.count("exam") == 1
     other = other_best(state_with(experiment, 6))
     examined = examiner(experiment, exams).early(other)
     assert examined is not None
@@ -227,7 +227,7 @@ def test_the_second_candidate_is_validated_where_the_first_fails(experiment, loo
     )
     looks.rehearsals = [-0.1, 0.3]
     assert examiner(experiment, exams).early(both) is None
-    looks.asked.clear()
+    looks.requested.clear()
     examined = examiner(experiment, exams, on_the_way=2).early(both)
     assert examined is not None
     assert examined.champion.fitness == -1.0
@@ -254,8 +254,8 @@ def test_level_anywhere_ends_the_run_only_if_the_stress_test_passes(
     experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
 ):
     """The certificate alone ends no run; if it fails, no stress test follows."""
-    asked = RequestedTrials(0.5, 0.95)
-    monkeypatch.setattr(examination, "stress", asked)
+    requested = RequestedTrials(0.5, 0.95)
+    monkeypatch.setattr(examination, "stress", requested)
     anywhere = {"level": "anywhere", "attempts": 4}
     state = state_with(experiment, 3)
     assert examiner(experiment, exams, **anywhere).early(state) is None
@@ -265,18 +265,18 @@ def test_level_anywhere_ends_the_run_only_if_the_stress_test_passes(
     assert examined.beyond is not None
     looks.certificates = [-0.1]
     assert not examiner(experiment, exams, **anywhere).best(ranked(experiment)).passed
-    assert asked.hasty == [True, True]
+    assert requested.hasty == [True, True]
 
 
 def test_at_the_end_the_whole_second_level_is_tested(
     experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
 ):
-    asked = RequestedTrials(0.5)
-    monkeypatch.setattr(examination, "stress", asked)
+    requested = RequestedTrials(0.5)
+    monkeypatch.setattr(examination, "stress", requested)
     examined = examiner(experiment, exams, level="anywhere").best(ranked(experiment))
     assert examined.certificate.passed
     assert not examined.passed
-    assert asked.hasty == [False]
+    assert requested.hasty == [False]
 
 
 def other_best(state: EvolutionState) -> EvolutionState:
@@ -291,7 +291,7 @@ def test_the_last_attempt_is_kept_for_the_end(experiment, looks, exams):
     two = examiner(experiment, exams, attempts=2)
     assert two.early(state) is None
     assert two.early(other_best(state)) is None
-    assert looks.asked.count("exam") == 1
+    assert looks.requested.count("exam") == 1
     assert two.best(ranked(experiment)).certificate.attempts == 2
 
 
@@ -300,7 +300,7 @@ def test_at_the_end_only_the_first_with_enough_margin_is_certified(experiment, l
     looks.rehearsals = [0.1, 0.25, 0.9]
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
     assert examined.certificate.passed
-    assert looks.asked == ["glance", "rehearsal"] * 2 + ["exam"]
+    assert looks.requested == ["glance", "rehearsal"] * 2 + ["exam"]
     assert examined.champion.fitness == 4.0
 
 
@@ -308,7 +308,7 @@ LOOK = ["glance", "rehearsal"]
 
 
 @pytest.mark.parametrize(
-    ("attempts", "certificates", "asked", "fitness"),
+    ("attempts", "certificates", "requested", "fitness"),
     [
         (1, [-0.5], [*LOOK * 2, "exam"], 4.0),
         (2, [-0.5], [*LOOK * 2, "exam", *LOOK, "exam"], 4.0),
@@ -318,15 +318,15 @@ LOOK = ["glance", "rehearsal"]
     ],
 )
 def test_at_the_end_a_run_uses_its_remaining_attempts(
-    experiment, looks, exams, attempts, certificates, asked, fitness
+    experiment, looks, exams, attempts, certificates, requested, fitness
 ):
     """The second and third candidates have enough margin, the first has a little."""
     settings = {"candidates": 3, "difference": 0.0, "attempts": attempts}
     looks.rehearsals, looks.certificates = [0.1, 0.25, 0.9], certificates
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
-    assert looks.asked == asked
+    assert looks.requested == requested
     assert examined.champion.fitness == fitness
-    assert exams.taken(9) == looks.asked.count("exam") <= attempts
+    assert exams.taken(9) == looks.requested.count("exam") <= attempts
 
 
 def test_at_the_end_no_further_candidate_that_would_fail_is_certified(experiment, looks, exams):
@@ -334,7 +334,7 @@ def test_at_the_end_no_further_candidate_that_would_fail_is_certified(experiment
     settings = {"candidates": 3, "difference": 0.0}
     looks.rehearsals, looks.certificates = [-0.3, -0.1, -0.2], [-0.5]
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
-    assert looks.asked == [*LOOK * 3, "exam"]
+    assert looks.requested == [*LOOK * 3, "exam"]
     assert examined.champion.fitness == 4.0
 
 
@@ -344,7 +344,7 @@ def test_at_the_end_the_best_margin_is_certified_where_none_is_enough(experiment
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
     assert examined.champion.fitness == 3.0
     # No disturbed trials after a failed nominal check.
-    assert looks.asked == ["glance", *["glance", "rehearsal"] * 2, "exam"]
+    assert looks.requested == ["glance", *["glance", "rehearsal"] * 2, "exam"]
     # A trial run ends once it can neither pass nor exceed the best so far.
     assert looks.wanted == pytest.approx([-0.3, 0.0])
 
@@ -363,11 +363,11 @@ def test_during_the_run_the_best_in_prescreening_are_validated(experiment, looks
         examiner(experiment, exams, **settings), prescreen=Shares(0.8, 0.92, 0.85, 0.95)
     )
     assert same.early(all_alike) is None
-    assert looks.asked == [*LOOK * 2]
-    looks.asked.clear()
+    assert looks.requested == [*LOOK * 2]
+    looks.requested.clear()
     one = dataclasses.replace(same, prescreen=Shares(0.8, 0.92, 0.85, 0.85), _margins={})
     assert one.early(all_alike) is None
-    assert looks.asked == LOOK
+    assert looks.requested == LOOK
     looks.rehearsals = [0.3]
     examined = dataclasses.replace(same, _margins={}).early(all_alike)
     assert examined.champion.fitness == 2.0
@@ -380,13 +380,13 @@ def test_at_the_end_prescreening_failures_are_validated_only_if_all_fail(experim
         examiner(experiment, exams, **settings), prescreen=Shares(0.5, 0.95, 0.92)
     )
     assert some.best(ranked(experiment)).champion.fitness == 4.0
-    assert looks.asked == [*LOOK * 2, "exam"]
-    looks.asked.clear()
+    assert looks.requested == [*LOOK * 2, "exam"]
+    looks.requested.clear()
     none = dataclasses.replace(
         examiner(experiment, exams, **settings), prescreen=Shares(0.5, 0.6, 0.7)
     )
     assert none.best(ranked(experiment)).champion.fitness == 3.0
-    assert looks.asked == [*LOOK, "exam"]
+    assert looks.requested == [*LOOK, "exam"]
 
 
 def test_at_the_end_a_candidate_that_has_failed_before_is_not_chosen(experiment, looks, exams):
@@ -532,7 +532,7 @@ def test_a_run_that_never_passes_goes_on_to_the_end(
     create_run(folder, experiment.creature, experiment.config)
     said = trained(folder, experiment)
     assert "All 9 generations are done" in said
-    tries = looks.asked.count("exam")
+    tries = looks.requested.count("exam")
     assert 2 <= tries <= experiment.config.examination.attempts
     assert f"This was examination {tries} of its run" in said
     written = (folder / CERTIFICATE).read_text(), (folder / EXAMS).read_text()

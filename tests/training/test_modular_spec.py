@@ -89,9 +89,9 @@ def test_walk_means_roam_for_modular_bodies():
     """The environment decides which task `walk` stands for."""
     for env, task in (("blocks", "roam"), ("tall_quadruped", "walk")):
         creature = load_creature(env)
-        asked = resolve_config(creature.settings.train, env, use={"task": "walk"})
-        assert asked.use.task == task
-        assert find("task", task).Settings is type(asked.fitness)
+        requested = resolve_config(creature.settings.train, env, use={"task": "walk"})
+        assert requested.use.task == task
+        assert find("task", task).Settings is type(requested.fitness)
     written = build_config({"use": {"controller": "brain", "task": "walk"}}, "test")
     assert (written.use.task, type(written.fitness)) == ("roam", RoamConfig)
 
@@ -161,10 +161,10 @@ def test_incompatible_settings_are_refused_in_one_sentence(
     env: str, given: dict[str, Any], said: str, tmp_path: Path
 ):
     creature, config = load_creature(env), build_config(given, "test")
-    for asked in (
+    for requested in (
         lambda: make_spec(creature, config),
         lambda: create_run(tmp_path, creature, config),
     ):
         with pytest.raises(UserError, match=f"{env}: .*{said}"):
-            asked()
+            requested()
     assert not list(tmp_path.iterdir()), "before anything is written"

@@ -40,8 +40,8 @@ def half(stool: Creature) -> Trials:
     assert stages.evaluate is not None
 
     def verdict(wanted: np.ndarray) -> Evaluation:
-        asked = RequestedTrials(wanted[None], known)
-        evaluation = stages.evaluate(numbers, rows.settings, starts, proposals.offspring, asked)
+        requested = RequestedTrials(wanted[None], known)
+        evaluation = stages.evaluate(numbers, rows.settings, starts, proposals.offspring, requested)
         return jax.tree.map(lambda leaf: leaf[0], jax.device_get(evaluation))
 
     return experiment, state, metrics, verdict

@@ -277,12 +277,12 @@ def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
     pitch = _clip(hold * senses["pitch"] + hold_rate * senses["pitch_rate"])
     roll = _clip(sway * senses["roll"] + sway_rate * senses["roll_rate"])
     yaw = _clip(turn * off_the_way(creature, senses))
-    asked = (
+    wanted = (
         (swing * ahead - stance * pitch, weights.ahead),
         (swing * aside + stance * roll, weights.aside),
         ((stance - swing) * yaw, weights.turn),
     )
-    by_joint = ((jnp.stack([feet[leg] for leg in weights.legs]), by) for feet, by in asked)
+    by_joint = ((jnp.stack([feet[leg] for leg in weights.legs]), by) for feet, by in wanted)
     return sum((of * by.astype(np.float32) for of, by in by_joint), start=jnp.zeros(()))
 
 

@@ -141,7 +141,7 @@ class TargetConfig:
             raise ValueError("turn and steer exclude each other; give one")
 
     @property
-    def asked(self) -> tuple[str, ...]:
+    def requested(self) -> tuple[str, ...]:
         """Names of the targets that are set."""
         values = {name: getattr(self, name) for name in TARGETS}
         # A traced value cannot be compared.
@@ -151,7 +151,7 @@ class TargetConfig:
     @property
     def table(self) -> dict[str, float | str]:
         """Targets that are set, by name."""
-        return {name: getattr(self, name) for name in self.asked}
+        return {name: getattr(self, name) for name in self.requested}
 
 
 @dataclasses.dataclass(frozen=True)

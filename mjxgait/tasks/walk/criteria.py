@@ -83,7 +83,7 @@ class WalkCriteria(StaysUp):
         self.wish = dict(wish or {})
 
     @override
-    def asked(self, wish: Wish) -> "WalkCriteria":
+    def with_targets(self, wish: Wish) -> "WalkCriteria":
         return WalkCriteria(wish) if wish else self
 
     @override

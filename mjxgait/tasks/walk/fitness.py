@@ -224,7 +224,7 @@ def missed(
     found: dict[str, jax.Array] = {}
     if wish.speed is not None:
         found["speed"] = _half_at(NEAR, steady_speed(step, horizon, stats) / wish.speed - 1.0)
-    if "gait" in wish.asked:
+    if "gait" in wish.requested:
         stations = creature.feet.stations
         found["gait"] = gait_missed(wish.gait, stations, stats.falls, stats.contact / lived)
     height = stats.height / lived
@@ -238,9 +238,9 @@ def missed(
     if wish.sway is not None:
         rolls = jnp.degrees(jnp.sqrt(stats.roll_squared / lived + 1e-12))
         found["sway"] = _half_at(ROUGH["sway"], rolls - wish.sway)
-    if set(LIKENESS) & set(wish.asked):
+    if set(LIKENESS) & set(wish.requested):
         own = likeness(creature, step, horizon, stats)
-        likes = [name for name in LIKENESS if name in wish.asked]
+        likes = [name for name in LIKENESS if name in wish.requested]
         off = {name: (own[name] - getattr(wish, name)) / UNLIKE[name] for name in likes}
         # Animals differ too, so a small error costs next to nothing.
         found |= {name: _half_at(1.0, away**2) for name, away in off.items()}
@@ -275,7 +275,7 @@ def steady_speed(step: float, horizon: int, stats: EpisodeStats) -> jax.Array:
 
 def target_weights(wish: TargetConfig) -> dict[str, float]:
     """Weights of the targets that are set and have a term of their own."""
-    return {n: getattr(wish.weights, n) for n in wish.asked if hasattr(wish.weights, n)}
+    return {n: getattr(wish.weights, n) for n in wish.requested if hasattr(wish.weights, n)}
 
 
 def _half_at(near: float, off: jax.Array) -> jax.Array:

@@ -87,9 +87,9 @@ def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> Certif
         config = dataclasses.replace(config, upright=dataclasses.replace(config.upright, tilt=tilt))
     if "speed" not in wish:
         return config
-    asked = wish["speed"]
-    slowest = FAST_ENOUGH * asked / size.body_length
-    stride = SHORTEST * animal_stride(asked, size.hip_height) / size.hip_height
+    requested = wish["speed"]
+    slowest = FAST_ENOUGH * requested / size.body_length
+    stride = SHORTEST * animal_stride(requested, size.hip_height) / size.hip_height
     return dataclasses.replace(
         config,
         progress=dataclasses.replace(

@@ -167,13 +167,13 @@ def speed_of(text: str, creature: Creature) -> float:
 
 def _pace(targets: WalkTargets, creature: Creature, config: Config) -> dict[str, object]:
     """Settings for speed and gait, and for a textbook cycle near which evolution begins."""
-    asked, name = targets.speed, targets.gait or AUTO
-    if asked is None and name == AUTO:
+    requested, name = targets.speed, targets.gait or AUTO
+    if requested is None and name == AUTO:
         return {}
-    speed = top_speed(creature, config) if asked is None else speed_of(asked, creature)
+    speed = top_speed(creature, config) if requested is None else speed_of(requested, creature)
     usual = natural_gait(creature, speed)
     wish = _natural(usual) if name == NATURAL else _named(name, creature)
-    if asked is not None:
+    if requested is not None:
         wish = merge(wish, _speed(round(speed, 6), creature))
     begins = drawn(usual if name in (AUTO, NATURAL) else name, speed, creature, config)
     return merge(merge(wish, {"evolution": ORDERED}), begins)

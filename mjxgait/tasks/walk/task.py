@@ -68,7 +68,7 @@ class Walk(PlainTask):
         cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: WalkConfig
     ) -> "Walk":
         """Return the task with these settings; targets need additional statistics."""
-        if settings.wish.asked and cls is Walk:
+        if settings.wish.requested and cls is Walk:
             return TargetedWalk(body, step, horizon, ends, settings)
         return cls(body, step, horizon, ends, settings)
 

@@ -76,7 +76,7 @@ def test_a_variant_with_its_own_config_ignores_that_of_the_study(stool: Creature
 def test_a_variant_can_have_a_target_gait_as_a_walk_can(stool: Creature):
     """An unsuitable gait is reported with the variant's name."""
     found = plan(stool, variant=[{"name": "base"}, {"name": "animal", "gait": "natural"}])
-    assert found.of("base")[0].config.fitness.wish.asked == ()
+    assert found.of("base")[0].config.fitness.wish.requested == ()
     asked = found.of("animal")[0].config
     walk = with_targets(resolve_config({}, stool.name, None), stool, WalkTargets(gait="natural"))
     assert asked.fitness.wish == walk.fitness.wish
