@@ -78,3 +78,17 @@ def test_a_missing_extra_is_named(loop, tmp_path, monkeypatch):
     with pytest.raises(UserError, match=r"\[usd\]"):
         export_usd(loop, tmp_path / "walk.usda")
     assert not (tmp_path / "walk.usda").exists()
+
+
+@pytest.mark.usefixtures("usd")
+def test_an_export_that_fails_leaves_the_old_file(loop, tmp_path, monkeypatch):
+    def fail(*_: object) -> None:
+        raise OSError("no space left")
+
+    path = tmp_path / "walk.usda"
+    path.write_text("mine")
+    monkeypatch.setattr("mjxgait.animation.export.usd._add_piece", fail)
+    with pytest.raises(OSError, match="no space"):
+        export_usd(loop, path)
+    assert [file.name for file in tmp_path.iterdir()] == ["walk.usda"]
+    assert path.read_text() == "mine"

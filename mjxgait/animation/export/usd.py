@@ -22,6 +22,7 @@ from mjxgait.animation.export.skeleton import (
 from mjxgait.animation.export.surface import Piece, along_limbs, linear, pieces_of
 from mjxgait.config.layers import install_command
 from mjxgait.errors import UserError
+from mjxgait.files import replaced
 
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
@@ -42,21 +43,22 @@ def export_usd(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
     creature = loop.walk.creature
     model, rest, axes = creature.model, resting(loop), gltf_axes(loop.walk.forward)
     skeleton = along_limbs(model, skeleton_of(model, creature.trunk), rest, axes)
-    try:
-        stage = Usd.Stage.CreateNew(str(path))
-    except Tf.ErrorException:
-        raise UserError(f"{path}: cannot be written") from None
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    stage.SetTimeCodesPerSecond(loop.rate)
-    stage.SetStartTimeCode(0)
-    stage.SetEndTimeCode(len(loop.qpos) - 1)
-    root = UsdSkel.Root.Define(stage, f"/{_word(creature.name)}")
-    stage.SetDefaultPrim(root.GetPrim())
-    joints = _add_skeleton(stage, root.GetPath(), loop, skeleton, travelling)
-    for piece in pieces_of(model, skeleton, axes, rest):
-        _add_piece(stage, root.GetPath(), piece, joints)
-    stage.GetRootLayer().Save()
+    with replaced(path) as beside:
+        try:
+            stage = Usd.Stage.CreateNew(str(beside))
+        except Tf.ErrorException:
+            raise UserError(f"{path}: cannot be written") from None
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        stage.SetTimeCodesPerSecond(loop.rate)
+        stage.SetStartTimeCode(0)
+        stage.SetEndTimeCode(len(loop.qpos) - 1)
+        root = UsdSkel.Root.Define(stage, f"/{_word(creature.name)}")
+        stage.SetDefaultPrim(root.GetPrim())
+        joints = _add_skeleton(stage, root.GetPath(), loop, skeleton, travelling)
+        for piece in pieces_of(model, skeleton, axes, rest):
+            _add_piece(stage, root.GetPath(), piece, joints)
+        stage.GetRootLayer().Save()
 
 
 def _add_skeleton(
