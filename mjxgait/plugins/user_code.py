@@ -127,9 +127,9 @@ def load(kind: str, text: str) -> str:
     base = _base(kind)
     if not issubclass(cls, base):
         raise UserError(f"{path}: {name} must inherit from {base.__module__}.{base.__name__}")
+    _refuse_old_names(path, cls)
     if missing := sorted(getattr(cls, "__abstractmethods__", ())):
         raise UserError(f"{path}: {name} lacks {', '.join(missing)}")
-    _refuse_old_names(path, cls)
     every = getattr(cls, "every", 1)
     try:
         holds(every)

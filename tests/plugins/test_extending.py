@@ -193,6 +193,7 @@ def test_the_dashboard_of_a_run_gets_the_same_code(folder: Path, trained, monkey
         ("--controller half.py:Half", "Half lacks act"),
         ("--controller broken.py:X", "cannot be loaded (ZeroDivisionError"),
         ("--controller rare.py:Rare", "Rare.every = 3: must be one of 1, 2, 4, 8, 16"),
+        ("--task old.py:Old", "Old.judge is now called evaluate; rename it"),
         ("--controller posse", 'did you mean "poses"'),
         ("--task my.py", "give FILE.py:CLASS"),
         ("--task", "name one of hop"),
@@ -207,6 +208,10 @@ def test_a_mistake_is_one_sentence(folder: Path, arguments, words, capfd, monkey
     act = "    def act(self, plan, memory, senses):\n        return 0, memory\n"
     (folder / "half.py").write_text(f"{head}class Half(RealController):\n{bounds}")
     (folder / "broken.py").write_text("1 / 0\n")
+    old = "from mjxgait.tasks.plain import PlainTask\nclass Old(PlainTask):\n"
+    (folder / "old.py").write_text(
+        f"{old}    def judge(self, stats, settings):\n        return {{}}\n"
+    )
     wild = f"class Wild(RealController):\n    reads = ('jont_pos',)\n{bounds}{act}"
     (folder / "wild.py").write_text(head + wild)
     (folder / "rare.py").write_text(
