@@ -11,7 +11,8 @@ import numpy as np
 
 from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
-from mjxgait.importer.parts import FREE, HINGE, SLIDE, Notes, Shape, read_shapes
+from mjxgait.importer.notes import Notes
+from mjxgait.importer.parts import FREE, HINGE, SLIDE, Shape, read_shapes
 
 UP_AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, 1.0])}
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.errors import UserError
-from mjxgait.importer.parts import Notes, listed
+from mjxgait.importer.notes import Notes, listed
 from mjxgait.importer.source import (
     MOST_ELEMENTS,
     MOST_INCLUDES,

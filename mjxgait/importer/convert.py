@@ -15,16 +15,16 @@ from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import in_plane
 from mjxgait.importer.balance import steady_balance
 from mjxgait.importer.body import KinematicModel, creature_xml
-from mjxgait.importer.checks import check_same, tell_dropped, tell_left_out
+from mjxgait.importer.checks import check_same
 from mjxgait.importer.clean import clean_mjcf, clean_urdf
 from mjxgait.importer.find import find_anatomy
+from mjxgait.importer.notes import Notes, listed, one_line, plain_names, tell_dropped, tell_left_out
 from mjxgait.importer.orient import (
     find_forward,
     find_mirror,
     is_planar,
     yaw_to,
 )
-from mjxgait.importer.parts import Notes, listed, one_line, plain_names
 from mjxgait.importer.rigged import RIGS, model_of
 from mjxgait.importer.skeleton import build_bodies
 from mjxgait.importer.source import Places, Source, parse_xml
@@ -120,7 +120,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, up, notes)
     if source.up:
         notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
-    tell_left_out(model, anatomy, notes)
+    tell_left_out(model, anatomy.bodies, notes)
     bodies = build_bodies(model, anatomy, source.efforts, notes)
     puppet = KinematicModel(
         bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root)

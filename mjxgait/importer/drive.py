@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.parts import Notes, listed
+from mjxgait.importer.notes import Notes, listed
 from mjxgait.importer.soles import Stance
 
 GRAVITY = 9.81

@@ -22,7 +22,8 @@ from mjxgait.importer.legs import (
     lowered_limbs,
     movable_joints,
 )
-from mjxgait.importer.parts import HINGE, SLIDE, Notes, listed
+from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.parts import HINGE, SLIDE
 
 MOST_BODIES, MOST_JOINTS = 400, 60
 ENOUGH = 6

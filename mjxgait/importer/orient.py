@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.parts import Confidence, Notes, listed
+from mjxgait.importer.notes import Confidence, Notes, listed
 
 FRONT_WORDS, BACK_WORDS = (
     ("front", "fore", "head", "nose", "neck", "snout"),

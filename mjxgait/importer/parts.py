@@ -1,72 +1,16 @@
-"""Bodies, joints and shapes of a creature between the compiled model and its folder; import notes.
+"""Bodies, joints and shapes of a creature between the compiled model and its folder.
 
 All quantities are in SI units.
 """
 
 import contextlib
 import dataclasses
-import re
-from typing import Literal
 
 import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from mjxgait.creature.geometry import rotation
-
-Confidence = Literal["high", "medium", "low"]
-
-
-@dataclasses.dataclass(frozen=True)
-class Change:
-    """A difference from the file, and its reason."""
-
-    what: str
-    why: str
-
-
-@dataclasses.dataclass(frozen=True)
-class Guess:
-    """A value that the file does not state. reason: the evidence for the guess."""
-
-    what: str
-    value: str
-    confidence: Confidence
-    reason: str
-
-
-class Notes:
-    """Changes and guesses of one import; each change is reported once."""
-
-    def __init__(self) -> None:
-        self.changes: list[Change] = []
-        self.guesses: list[Guess] = []
-
-    def change(self, what: str, why: str) -> None:
-        """Report a change."""
-        change = Change(what, why)
-        if change not in self.changes:
-            self.changes.append(change)
-
-    def guess(self, what: str, value: str, confidence: Confidence, reason: str) -> None:
-        """Report a guess; a later guess of the same thing replaces the earlier."""
-        self.guesses = [g for g in self.guesses if g.what != what]
-        self.guesses.append(Guess(what, value, confidence, reason))
-
-    def text(self) -> str:
-        """Return the report in plain lines."""
-        lines = (
-            ["Changes:"] + [f"  - {c.what}: {c.why}" for c in self.changes] if self.changes else []
-        )
-        lines += ["Guesses (change them in creature.toml):"]
-        lines += [f"  - {g.what} = {g.value}  [{g.confidence}] {g.reason}" for g in self.guesses]
-        return "\n".join(lines)
-
-
-def listed(names: list[str], most: int = 6) -> str:
-    """`a, b, c` or `a, b, c and 7 more`."""
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
-
 
 GEOM = mujoco.mjtGeom
 FREE, BALL, SLIDE, HINGE = (
@@ -217,27 +161,3 @@ def hull_points(points: np.ndarray) -> np.ndarray:
         chosen.append(int(distance.argmax()))
         distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
     return points[chosen]
-
-
-def one_line(text: str) -> str:
-    """Return a text that can stand in a comment and in any file.
-
-    Control characters become spaces; bytes of a file name that are not Unicode become question
-    marks.
-    """
-    told = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
-    return re.sub(r"[\x00-\x1f\x7f-\x9f]", " ", told)
-
-
-def plain_names(names: list[str], fallback: list[str]) -> list[str]:
-    """Return unique names that can stand in a shell pattern."""
-    used: set[str] = set()
-    result = []
-    for name, other in zip(names, fallback, strict=True):
-        plain = re.sub(r"[^A-Za-z0-9_.\-]+", "_", name).strip("_")[:60] or other
-        unique, i = plain, 2
-        while unique in used:
-            unique, i = f"{plain}_{i}", i + 1
-        used.add(unique)
-        result.append(unique)
-    return result

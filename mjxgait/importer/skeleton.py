@@ -9,7 +9,8 @@ import numpy as np
 
 from mjxgait.creature.geometry import quaternion, rotation
 from mjxgait.importer.anatomy import Anatomy
-from mjxgait.importer.parts import BALL, HINGE, Body, Joint, Notes, Shape, listed, plain_names
+from mjxgait.importer.notes import Notes, listed, plain_names
+from mjxgait.importer.parts import BALL, HINGE, Body, Joint, Shape
 
 MOST_RADIANS = 4 * np.pi
 """Limit in rad beyond which the file's value was meant in degrees."""

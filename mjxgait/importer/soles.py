@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 
 from mjxgait.creature.geometry import quaternion, rotation
-from mjxgait.importer.parts import GEOM, Body, Notes, Shape
+from mjxgait.importer.notes import Notes
+from mjxgait.importer.parts import GEOM, Body, Shape
 from mjxgait.importer.skeleton import Tip, foot_tips, tip_points
 
 SPHERE, CAPSULE = int(GEOM.mjGEOM_SPHERE), int(GEOM.mjGEOM_CAPSULE)

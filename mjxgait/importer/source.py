@@ -15,7 +15,7 @@ import mujoco
 
 from mjxgait.errors import UserError
 from mjxgait.files import read_bytes
-from mjxgait.importer.parts import Guess, Notes
+from mjxgait.importer.notes import Guess, Notes
 
 MOST_XML = 4_000_000
 MOST_MESH = 30_000_000

@@ -10,7 +10,8 @@ from mjxgait.importer.anatomy import Anatomy
 from mjxgait.importer.balance import Held, hold
 from mjxgait.importer.body import KinematicModel, compile_own, creature_xml
 from mjxgait.importer.drive import Drive, plan_drive
-from mjxgait.importer.parts import Body, Notes
+from mjxgait.importer.notes import Notes
+from mjxgait.importer.parts import Body
 from mjxgait.importer.soles import guard_parts, lay_soles
 from mjxgait.importer.source import Source
 from mjxgait.importer.stance import (

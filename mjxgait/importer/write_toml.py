@@ -10,7 +10,7 @@ from mjxgait.config.schema import Config
 from mjxgait.config.tables import Table
 from mjxgait.controllers.key_poses.config import unhurried
 from mjxgait.importer.drive import Drive
-from mjxgait.importer.parts import Confidence, Notes, one_line
+from mjxgait.importer.notes import Confidence, Notes, one_line
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.gaits import stride_limit
 
