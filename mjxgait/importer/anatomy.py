@@ -12,8 +12,11 @@ import numpy as np
 from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
 from mjxgait.importer.notes import Notes
-from mjxgait.importer.parts import FREE, HINGE, SLIDE, Shape, read_shapes
+from mjxgait.importer.shapes import Shape
 
+FREE, BALL, SLIDE, HINGE = (
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE")
+)
 UP_AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, 1.0])}
 
 
@@ -149,12 +152,14 @@ def turn_up(axis: np.ndarray) -> np.ndarray:
 class Anatomy:
     """Anatomy of a creature in one pose, up is z.
 
-    qpos: [nq] that pose. xpos [B, 3] m, xrot [B, 3, 3]: bodies in it. root: body id. bodies: ids of
-    the creature's bodies, parents first. active: ids of joints that move. feet: ids of the last
-    moving body of each leg. scale: m per unit of length. shapes: of each body, scaled. lowered:
-    whether qpos has the limbs let down instead of the file's zero pose.
+    spec: editable copy of its bodies, in the order of `bodies`. qpos: [nq] that pose. xpos [B, 3]
+    m, xrot [B, 3, 3]: bodies in it. root: body id. bodies: ids of the creature's bodies, parents
+    first. active: ids of joints that move. feet: ids of the last moving body of each leg. scale: m
+    per unit of length. shapes: of each body. lowered: whether qpos has the limbs let down instead
+    of the file's zero pose.
     """
 
+    spec: mujoco.MjSpec
     qpos: np.ndarray
     xpos: np.ndarray
     xrot: np.ndarray
@@ -184,24 +189,14 @@ def measured(
     model: mujoco.MjModel,
     qpos: np.ndarray,
     axis: np.ndarray,
-    root: int,
-    bodies: list[int],
     scale: float,
+    spec: mujoco.MjSpec,
+    shapes: dict[int, list[Shape]],
 ) -> Anatomy:
     """Measure the creature in one pose, without joints and feet. axis: [3], up in the file."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
-    turn = turn_up(axis)
-    shapes = {}
-    for b in bodies:
-        shapes[b] = read_shapes(model, b)
-        for s in shapes[b]:
-            s.size, s.pos, s.points, s.radius = (
-                s.size * scale,
-                s.pos * scale,
-                s.points * scale,
-                s.radius * scale,
-            )
-    xrot = turn @ data.xmat.reshape(-1, 3, 3)
-    return Anatomy(qpos, scale * data.xpos @ turn.T, xrot, root, bodies, [], [], scale, shapes)
+    turn, bodies = turn_up(axis), list(shapes)
+    xpos, xrot = scale * data.xpos @ turn.T, turn @ data.xmat.reshape(-1, 3, 3)
+    return Anatomy(spec, qpos, xpos, xrot, bodies[0], bodies, [], [], scale, shapes)

@@ -14,8 +14,7 @@ from mjxgait.creature.geometry import rotation
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import in_plane
 from mjxgait.importer.balance import steady_balance
-from mjxgait.importer.body import KinematicModel, creature_xml
-from mjxgait.importer.checks import check_same
+from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.clean import clean_mjcf, clean_urdf
 from mjxgait.importer.find import find_anatomy
 from mjxgait.importer.notes import Notes, listed, one_line, plain_names, tell_dropped, tell_left_out
@@ -26,8 +25,8 @@ from mjxgait.importer.orient import (
     yaw_to,
 )
 from mjxgait.importer.rigged import RIGS, model_of
-from mjxgait.importer.skeleton import build_bodies
 from mjxgait.importer.source import Places, Source, parse_xml
+from mjxgait.importer.spec import add_joints, creature_xml, place_bodies
 from mjxgait.importer.stance import stance_of
 from mjxgait.importer.standing import (
     Candidate,
@@ -121,10 +120,10 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     if source.up:
         notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
     tell_left_out(model, anatomy.bodies, notes)
-    bodies = build_bodies(model, anatomy, source.efforts, notes)
-    puppet = KinematicModel(
-        bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root)
-    )
+    place_bodies(model, anatomy)
+    joints = add_joints(model, anatomy, source.efforts, notes)
+    feet = [anatomy.bodies.index(b) for b in anatomy.feet]
+    puppet = KinematicModel(anatomy.spec, feet, *joints, in_plane(model, anatomy.root))
     start = first_pose(puppet, model, anatomy)
     puppet.turn(yaw_to(find_forward(puppet, start, choices.forward, notes)))
     rest = puppet.qpos(np.zeros(len(puppet.joints))) if source.up else None
@@ -138,10 +137,9 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
             f'"{model.body(anatomy.root).name}" lies on the floor, and all of it that is not a foot '
             "falls through: this has no legs to walk on"
         )
-    feet = {name for foot in best.feet for name in foot}
-    steady_balance(best.drive, best.puppet.names, best.model, best.qpos, feet, best.notes)
+    soles = {name for foot in best.feet for name in foot}
+    steady_balance(best.drive, best.puppet.names, best.puppet.model, best.qpos, soles, best.notes)
     name = plain_names([choices.name or path.stem], ["creature"])[0].strip(".-") or "creature"
-    check_same(model, anatomy, best.puppet, best.model)
     if rest is not None:
         rest[:3] = best.qpos[:3]
     return _folder(name, one_line(path.name), best, mirror, planar, rest)
@@ -203,7 +201,7 @@ def _folder(
     )
     pairs = {} if mirror is None else _stated_pairs(puppet, best.q, mirror, planar)
     forward = rotation(puppet.bodies[0].quat).T @ [1.0, 0.0, 0.0]
-    if stopped := [joint.name for joint in puppet.joints if joint.stopped]:
+    if stopped := [joint.name for joint in puppet.joints if joint.limited == 1]:
         notes.change(
             f"limits act on {listed(stopped)} only",
             "these stand at the end of their range and rest on it",
@@ -230,7 +228,7 @@ def _folder(
         f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
     )
     files = {
-        XML: creature_xml(name, puppet.bodies, best.qpos, rest),
+        XML: creature_xml(puppet.spec, name, best.qpos, rest),
         TOML: toml,
         README: report,
     }
@@ -257,7 +255,7 @@ def _stated_pairs(
 
 def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> Settings:
     """Return the table `[train]`. stated_length: m, of a body shorter than its legs."""
-    model, data = best.model, mujoco.MjData(best.model)
+    model, data = best.puppet.model, mujoco.MjData(best.puppet.model)
     data.qpos[:] = best.qpos
     mujoco.mj_kinematics(model, data)
     length = stated_length or geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
@@ -275,7 +273,7 @@ def _stated_length(best: Candidate) -> float | None:
     Target and measured speeds are in body lengths. A biped measured from its back to its toes would
     score well for shuffling.
     """
-    model, data = best.model, mujoco.MjData(best.model)
+    model, data = best.puppet.model, mujoco.MjData(best.puppet.model)
     data.qpos[:] = best.qpos
     mujoco.mj_kinematics(model, data)
     hip = stance_of(best.puppet, best.qpos[7:]).hip

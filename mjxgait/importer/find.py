@@ -9,6 +9,8 @@ import numpy as np
 from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import (
+    HINGE,
+    SLIDE,
     Anatomy,
     find_root,
     measured,
@@ -23,7 +25,8 @@ from mjxgait.importer.legs import (
     movable_joints,
 )
 from mjxgait.importer.notes import Notes, listed
-from mjxgait.importer.parts import HINGE, SLIDE
+from mjxgait.importer.shapes import shapes_of
+from mjxgait.importer.spec import copy_bodies
 
 MOST_BODIES, MOST_JOINTS = 400, 60
 ENOUGH = 6
@@ -53,13 +56,16 @@ def find_anatomy(
     scale = unit_length(model, bodies, notes)
     qpos = _reference_pose(model)
     axis = up_axis(model, bodies, root, qpos, up, notes)
-    anatomy = measured(model, qpos, axis, root, bodies, scale)
+    spec = copy_bodies(model, bodies, scale)
+    shapes = {b: shapes_of(spec, spec.bodies[i + 1], i) for i, b in enumerate(bodies)}
+    anatomy = measured(model, qpos, axis, scale, spec, shapes)
     tell_root_joints(model, root, notes)
     movable = movable_joints(model, anatomy, coupled, freeze, notes)
     try:
         anatomy.feet = find_feet(model, anatomy, movable)
     except NoLegs as error:
-        anatomy = measured(model, lowered_limbs(model, anatomy, movable), axis, root, bodies, scale)
+        lowered = lowered_limbs(model, anatomy, movable)
+        anatomy = measured(model, lowered, axis, scale, spec, shapes)
         anatomy.lowered = True
         anatomy.feet = find_feet(model, anatomy, movable)
         if len(anatomy.feet) < 2:  # an arm on its base can reach down too

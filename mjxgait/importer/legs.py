@@ -9,9 +9,9 @@ import numpy as np
 
 from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
-from mjxgait.importer.anatomy import Anatomy
+from mjxgait.importer.anatomy import FREE, HINGE, SLIDE, Anatomy
 from mjxgait.importer.notes import Notes, listed
-from mjxgait.importer.parts import FREE, HINGE, SLIDE, Shape
+from mjxgait.importer.shapes import Shape
 
 SAME_LEVEL = 0.2
 """Share of the creature's height: limbs that end this close to the lowest point are legs."""
