@@ -10,7 +10,6 @@ import numpy as np
 
 from mjxgait.animation.clips.clip import ELSEWHERE
 from mjxgait.creature import geometry
-from mjxgait.creature.geometry import rotation
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import in_plane
 from mjxgait.importer.balance import steady_balance
@@ -190,9 +189,7 @@ def _folder(
 ) -> Imported:
     """Write the texts of the folder. rest: [nq] rest pose of a skeleton, None for other models."""
     puppet, notes = best.puppet, best.notes
-    feet = [geom for foot in best.feet for geom in foot]
-    trunk = puppet.bodies[0].name
-    notes.guess("trunk", trunk, "high", "the body that all limbs hang on")
+    notes.guess("trunk", puppet.bodies[0].name, "high", "the body that all limbs hang on")
     notes.guess(
         "feet",
         f"{len(best.feet)} feet",
@@ -200,7 +197,6 @@ def _folder(
         "limbs that end lowest",
     )
     pairs = {} if mirror is None else _stated_pairs(puppet, best.q, mirror, planar)
-    forward = rotation(puppet.bodies[0].quat).T @ [1.0, 0.0, 0.0]
     if stopped := [joint.name for joint in puppet.joints if joint.limited == 1]:
         notes.change(
             f"limits act on {listed(stopped)} only",
@@ -208,21 +204,17 @@ def _folder(
         )
     puppet.pose(best.q)
     passing = planar and bool(geometry.parallel(puppet.data.xaxis[1:]).all())
-    length = _stated_length(best)
-    train = _train(best, mirror is not None, length)
+    hip, length = _sizes(best)
+    shorter = length < hip
+    if shorter:
+        # Speeds count in body lengths: a biped measured from its back to its toes would score well
+        # for shuffling.
+        length = hip
+        why = "the hip height: the body is shorter than its legs, and speeds count in it"
+        notes.guess("body_length", f"{hip:.3g}", "medium", why)
+    train = _train(best, mirror is not None, hip, length)
     toml = creature_toml(
-        name,
-        origin,
-        trunk,
-        forward,
-        feet,
-        puppet.names,
-        best.drive,
-        (mirror is not None, pairs),
-        length,
-        passing,
-        train,
-        notes,
+        name, origin, best, mirror is not None, pairs, length if shorter else None, passing, train
     )
     report = (
         f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
@@ -253,36 +245,19 @@ def _stated_pairs(
     }
 
 
-def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> Settings:
-    """Return the table `[train]`. stated_length: m, of a body shorter than its legs."""
+def _sizes(best: Candidate) -> tuple[float, float]:
+    """Hip height and body length in m in the standing pose."""
     model, data = best.puppet.model, mujoco.MjData(best.puppet.model)
     data.qpos[:] = best.qpos
     mujoco.mj_kinematics(model, data)
-    length = stated_length or geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
-    hip = stance_of(best.puppet, best.qpos[7:]).hip
-    steps = bool(best.drive.ahead or best.drive.aside)
-    step = float(model.opt.timestep)
-    rotor = float(np.median([joint.armature for joint in best.puppet.joints]))
-    legs, hinges, mass = len(best.puppet.feet), len(best.puppet.joints), best.puppet.mass
+    length = geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
+    return stance_of(best.puppet, best.qpos[7:]).hip, length
+
+
+def _train(best: Candidate, symmetric: bool, hip: float, length: float) -> Settings:
+    """Return the table `[train]`. hip, length: m, of the hip height and the body."""
+    puppet, steps = best.puppet, bool(best.drive.ahead or best.drive.aside)
+    step, mass = float(puppet.model.opt.timestep), puppet.mass
+    rotor = float(np.median([joint.armature for joint in puppet.joints]))
+    legs, hinges = len(puppet.feet), len(puppet.joints)
     return manner(steps, legs, hinges, symmetric, hip, length, mass, step, rotor, best.notes)
-
-
-def _stated_length(best: Candidate) -> float | None:
-    """Body length in m of a body shorter than its legs, such as a biped; None for all others.
-
-    Target and measured speeds are in body lengths. A biped measured from its back to its toes would
-    score well for shuffling.
-    """
-    model, data = best.puppet.model, mujoco.MjData(best.puppet.model)
-    data.qpos[:] = best.qpos
-    mujoco.mj_kinematics(model, data)
-    hip = stance_of(best.puppet, best.qpos[7:]).hip
-    if geometry.body_length(model, data, np.array([1.0, 0.0, 0.0])) >= hip:
-        return None
-    best.notes.guess(
-        "body_length",
-        f"{hip:.3g}",
-        "medium",
-        "the hip height: the body is shorter than its legs, and speeds count in it",
-    )
-    return hip

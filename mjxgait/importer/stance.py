@@ -5,7 +5,7 @@ Letters: `J` active joints, `F` feet.
 
 import numpy as np
 
-from mjxgait.creature.geometry import quaternion, rotation
+from mjxgait.creature.geometry import rotation
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.soles import Stance
 
@@ -222,11 +222,3 @@ class Search:
             + 5 * low_trunk
             + 0.2 * ((q - self.start) ** 2).mean()
         )
-
-
-def upright_quat(quat: np.ndarray) -> np.ndarray:
-    """Quaternion [4] with the same tilt and no turn about z."""
-    matrix = rotation(quat)
-    yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
-    back = np.array([[np.cos(yaw), np.sin(yaw), 0], [-np.sin(yaw), np.cos(yaw), 0], [0, 0, 1.0]])
-    return quaternion(back @ matrix)
