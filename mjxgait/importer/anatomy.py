@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.creature.geometry import ancestors
+from mjxgait.creature.geometry import ancestors, subtree
 from mjxgait.errors import UserError
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.shapes import Shape
@@ -28,33 +28,24 @@ def find_root(model: mujoco.MjModel) -> int:
     tops = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
 
     def weight(top: int) -> tuple[int, float]:
-        inside = [b for b in range(1, model.nbody) if top in ancestors(model, b)]
-        return sum(int(model.body_jntnum[b]) for b in inside), float(model.body_subtreemass[top])
+        joints = int(model.body_jntnum[subtree(model, top)].sum())
+        return joints, float(model.body_subtreemass[top])
 
     if not tops:
         raise UserError("the model has no body; there is nothing that could walk")
     root = max(tops, key=weight)
     while True:
-        children = [
-            b for b in range(1, model.nbody) if model.body_parentid[b] == root and b != root
-        ]
-        slides = _types(model, root) and all(t in (SLIDE, HINGE) for t in _types(model, root))
-        carries = len(children) == 1 and model.body_mass[root] < 1e-2 * model.body_subtreemass[root]
-        leads_on = children and SLIDE in _types(model, children[0])
-        below = children and any(t == SLIDE for t in _types(model, root))
-        if carries and (leads_on or (slides and below)):
-            root = children[0]
-        else:
+        children = [int(b) for b in np.flatnonzero(model.body_parentid == root)]
+        if len(children) != 1 or model.body_mass[root] >= 1e-2 * model.body_subtreemass[root]:
             return root
+        own, slides_on = _types(model, root), SLIDE in _types(model, children[0])
+        if not slides_on and not (SLIDE in own and set(own) <= {SLIDE, HINGE}):
+            return root
+        root = children[0]
 
 
 def _types(model: mujoco.MjModel, body: int) -> list[int]:
-    start = int(model.body_jntadr[body])
-    return (
-        [int(t) for t in model.jnt_type[start : start + int(model.body_jntnum[body])]]
-        if start >= 0
-        else []
-    )
+    return [int(t) for t in model.jnt_type[model.jnt_bodyid == body]]
 
 
 def in_plane(model: mujoco.MjModel, root: int) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.creature.geometry import ancestors
+from mjxgait.creature.geometry import ancestors, subtree
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import (
     HINGE,
@@ -52,7 +52,7 @@ def find_anatomy(
     """
     _check_size(model)
     root = find_root(model)
-    bodies = [b for b in range(1, model.nbody) if root in ancestors(model, b)]
+    bodies = subtree(model, root)
     scale = unit_length(model, bodies, notes)
     qpos = _reference_pose(model)
     axis = up_axis(model, bodies, root, qpos, up, notes)
@@ -145,8 +145,7 @@ def _freeze_least(
     for foot in anatomy.feet:
         chain = ancestors(model, foot)
         leg = [j for j in anatomy.active if int(model.jnt_bodyid[j]) in chain]
-        below = [b for b in anatomy.bodies if foot in ancestors(model, b)]
-        ends = data.xpos[below]
+        ends = data.xpos[subtree(model, foot)]
 
         def reach(joint: int, ends: np.ndarray = ends) -> float:
             arms = ends - data.xanchor[joint]

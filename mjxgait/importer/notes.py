@@ -7,7 +7,7 @@ from typing import Literal
 import mujoco
 import numpy as np
 
-from mjxgait.creature.geometry import ancestors
+from mjxgait.creature.geometry import ancestors, subtree
 
 Confidence = Literal["high", "medium", "low"]
 
@@ -135,7 +135,7 @@ def tell_left_out(model: mujoco.MjModel, bodies: list[int], notes: Notes) -> Non
 
 def _content(model: mujoco.MjModel, top: int) -> str:
     """Mass and hinges of the tree below a body, in words."""
-    inside = [b for b in range(1, model.nbody) if top in ancestors(model, b)]
+    inside = subtree(model, top)
     hinges = int(
         np.isin(model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE], inside).sum()
     )
