@@ -125,25 +125,25 @@ def measure(options: argparse.Namespace, engine: str, lanes: str) -> None:
     given = (batch.known[0], batch.rows.settings, batch.rows.starts, genomes)
     given = jax.device_put(given, everywhere(experiment.simulator))
     began = time.perf_counter()
-    program = compiled(batch.lower_judge(genomes, batch.rows.starts))
+    program = compiled(batch.lower_evaluate(genomes, batch.rows.starts))
     compile_s = time.perf_counter() - began
     said.write(json.dumps({"compile": compile_s}) + "\n")
     sys.stdin.readline()
-    judged = jax.block_until_ready(program(*given))
+    evaluation = jax.block_until_ready(program(*given))
     seconds, power = passes(lambda: jax.block_until_ready(program(*given)), options.passes)
-    steps, fastest = int(judged.sim_steps.sum()), min(seconds)
+    steps, fastest = int(evaluation.sim_steps.sum()), min(seconds)
     joules = mean(power) * mean(seconds) / (steps / 1e6) if power else None
-    outcome = judged.outcome[..., experiment.simulator.task.outcomes.index("forward")]
+    outcome = evaluation.outcome[..., experiment.simulator.task.outcomes.index("forward")]
     found = {
         "compile": compile_s,
         "steps/s": steps / fastest,
         "us": 1e6 * fastest / experiment.simulator.steps,
         "W": mean(power) if power else None,
         "J/M": joules,
-        "alive": 1.0 - float(judged.failed.mean()),
+        "alive": 1.0 - float(evaluation.failed.mean()),
         "forward": float(outcome.mean()),
         "steps": steps,
-        "computed_steps": int(judged.computed_steps.sum()),
+        "computed_steps": int(evaluation.computed_steps.sum()),
         "seconds": seconds,
         "device": jax.devices()[0].device_kind,
         "devices": jax.device_count(),

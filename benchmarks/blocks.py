@@ -60,8 +60,8 @@ def stepped(plant, body: BodyState, torque: jax.Array) -> Run:
     @jax.jit
     def go(body: BodyState, torque: jax.Array) -> BodyState:
         def one(step: jax.Array, body: BodyState) -> BodyState:
-            _, workings = plant.forward(body)
-            return plant.advance(body, workings, jnp.sin(0.05 * step) * torque)
+            _, step_data = plant.forward(body)
+            return plant.advance(body, step_data, jnp.sin(0.05 * step) * torque)
 
         return jax.lax.fori_loop(0, STEPS, one, body)
 

@@ -130,14 +130,14 @@ def follow(creature: Creature, plant: Plant, state: BodyState) -> tuple[BodyStat
             creature.joints.stand,
         )
     )
-    sensed, workings = plant.forward(state)
+    sensed, step_data = plant.forward(state)
     pull = spd.pd_force(sensed.joint_pos, sensed.joint_vel, goal, kp, kd, step)
     lift = partial(lifted, creature)
     force = lift(pull) + state.constraint_force - sensed.bias
     braked = jnp.broadcast_to(step * kd, pull.shape)
-    acceleration = plant.solve_damped(workings, lift(braked), force)
+    acceleration = plant.solve_damped(step_data, lift(braked), force)
     torque = spd.limited_torque(pull, acceleration[creature.joints.dof_adr], braked, limit)
-    return plant.advance(state, workings, lift(torque)), sensed
+    return plant.advance(state, step_data, lift(torque)), sensed
 
 
 def lifted(creature: Creature, joints: jax.Array) -> jax.Array:

@@ -39,7 +39,7 @@ from mjxgait.creature import Creature
 from mjxgait.distributed.connect import connected
 from mjxgait.distributed.jobs import AdvanceRows, Job
 from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.rows import Blocks
+from mjxgait.distributed.rows import ChunkedEvaluator
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.plugins import resolve_config
 from mjxgait.simulation.evaluator import Evaluator
@@ -47,7 +47,7 @@ from mjxgait.tasks.starts import Starts
 from mjxgait.training.checkpoint import Checkpoints, pack
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.stages import prepare_devices
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 if TYPE_CHECKING:
     from mjxgait.distributed.ray_backend import RayBackend
@@ -155,7 +155,7 @@ def blocks(scheduler: Scheduler, options: argparse.Namespace) -> dict[str, Any]:
     creature, config = subject(options, 512)
     experiment = build_experiment(creature, config)
     clock = Clock(scheduler)
-    step = experiment.compile(Blocks(cast(Scheduler, clock), creature, config))
+    step = experiment.compile(ChunkedEvaluator(cast(Scheduler, clock), creature, config))
     begun = experiment.place(experiment.init())
     for machine in (0, 1):
         with one_of(scheduler, machine):
@@ -182,18 +182,18 @@ def overhead(scheduler: Scheduler, options: argparse.Namespace) -> dict[str, Any
     found: dict[str, Any] = {"population": SIZES[-1]}
     for size in SIZES:
         creature, config = subject(options, SIZES[-1], seconds=0.05, block=size)
-        judged = Timed(Blocks(scheduler, creature, config))
+        evaluation = Timed(ChunkedEvaluator(scheduler, creature, config))
         experiment = build_experiment(creature, config)
-        step = experiment.compile(judged)
+        step = experiment.compile(evaluation)
         state = experiment.place(experiment.init())
         beside, rest = [], []
         with one_of(scheduler, 0):
             for _ in range(6):
-                began, worked, judged.seconds = time.perf_counter(), work_of(scheduler), 0.0
+                began, worked, evaluation.seconds = time.perf_counter(), work_of(scheduler), 0.0
                 state, _ = jax.block_until_ready(step(state))
                 wall = time.perf_counter() - began
-                beside.append(judged.seconds - (work_of(scheduler) - worked))
-                rest.append(wall - judged.seconds)
+                beside.append(evaluation.seconds - (work_of(scheduler) - worked))
+                rest.append(wall - evaluation.seconds)
         found[f"blocks of {size}"] = {
             "ms beside the blocks": round(1000 * median(beside[1:]), 1),
             "ms per block": round(1000 * median(beside[1:]) * size / SIZES[-1], 2),
@@ -262,12 +262,12 @@ class Timed:
     def __init__(self, evaluator: Evaluator) -> None:
         self._evaluator, self.seconds = evaluator, 0.0
 
-    def judge(
-        self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
-    ) -> Judged:
+    def evaluate(
+        self, genomes: Any, trials: Starts, settings: Config, asked: RequestedTrials | None = None
+    ) -> Evaluation:
         jax.block_until_ready(genomes)
         began = time.perf_counter()
-        found = self._evaluator.judge(genomes, trials, settings, asked)
+        found = self._evaluator.evaluate(genomes, trials, settings, asked)
         self.seconds += time.perf_counter() - began
         return found
 

@@ -212,8 +212,8 @@ def our_replay(plant: Plant, trace: Trace) -> tuple[Callable[[], object], float]
     states = BodyState(qpos, qvel, warmstart, warmstart, jnp.ones((STEPS, LANES)))
 
     def step(total: jax.Array, now: tuple[BodyState, jax.Array]) -> tuple[jax.Array, None]:
-        sensed, workings = plant.forward(now[0])
-        results = jax.tree.leaves((sensed, plant.advance(now[0], workings, now[1])))
+        sensed, step_data = plant.forward(now[0])
+        results = jax.tree.leaves((sensed, plant.advance(now[0], step_data, now[1])))
         return total + sum(jnp.sum(x.reshape(-1, LANES), axis=0) for x in results), None
 
     def replay(trace: tuple[BodyState, jax.Array]) -> jax.Array:

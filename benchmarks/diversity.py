@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 
 import mjxgait
-from mjxgait.certification import judged
+from mjxgait.certification import verdict_of
 from mjxgait.evolution.state import NOBODY
 from mjxgait.training.folder import CERTIFICATE
 
@@ -74,7 +74,7 @@ def animal(folder: Path) -> Animal:
     model = mujoco.MjModel.from_xml_path(str(folder / "body" / "creature.xml"))
     return Animal(
         name=folder.name,
-        certified=judged(told).certified,
+        certified=verdict_of(told).certified,
         speed=told["report"]["speed"],
         blocks=told["report"]["parts"],
         hinges=model.nv - 6,

@@ -20,10 +20,10 @@ from pathlib import Path
 
 from mjxgait.certification import (
     distance,
-    judged,
     outdated,
     read_certificate,
     survival,
+    verdict_of,
 )
 from mjxgait.processes import python_command
 from mjxgait.training.folder import (
@@ -98,7 +98,7 @@ def row(folder: Path, seed: int, wall: float) -> list[str]:
     seconds, evolved = config.rollout.seconds, champion.origin["nominal"]["forward"]
     examined = distance(creature, champion, seconds)
     starts = next(c for c in certificate["criteria"] if c["number"] == 4)["measures"][0]["value"]
-    margin, verdict = certificate["margin"], judged(certificate)
+    margin, verdict = certificate["margin"], verdict_of(certificate)
     old = outdated(certificate, champion, creature)
     return [
         creature.name,

@@ -2,7 +2,7 @@
 
     python benchmarks/imported.py --models "laikago" "gym ant" --out runs/imported
 
-Names are those of `tests/importing/packages.py`, with files from the package index; `--files` takes
+Names are those of `tests/importer/packages.py`, with files from the package index; `--files` takes
 others, such as the rigs that `benchmarks/rig_of_blender.py` writes. Options after `--` go to
 `train`. Columns: wall time of both commands together and of the import alone; whether the champion
 is certified, and the margin of its worst criterion; speed over the certificate's 20 s; generations;
@@ -21,9 +21,9 @@ from typing import Any
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 import numpy as np
-from importing.packages import MODELS, model_file
+from importer.packages import MODELS, model_file
 
-from mjxgait.certification import judged
+from mjxgait.certification import verdict_of
 from mjxgait.processes import python_command
 from mjxgait.training.folder import CERTIFICATE, METRICS, read_metrics
 
@@ -88,7 +88,7 @@ def _mjxgait(log: Path, *command: str) -> str:
 
 
 def _findings(certificate: dict[str, Any], generations: int) -> list[str]:
-    verdict = judged(certificate)
+    verdict = verdict_of(certificate)
     measures = [m for c in verdict.failed for m in c.measures if not m.passed]
     values = ["none" if np.isnan(m.value) else f"{m.value:.3g}" for m in measures]
     report, margin = certificate["report"], certificate["margin"]

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.animation.keys.refine import departure_of
-from mjxgait.certification import judged, read_certificate
+from mjxgait.certification import read_certificate, verdict_of
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import Creature, load_creature
 from mjxgait.processes import python_command
@@ -110,8 +110,8 @@ def refined(folder: Path, name: str, keep: float, others: list[str]) -> dict[str
         return found | {"certified": False}
     apart = departure_of(run)
     return found | {
-        "certified": judged(document).certified,
-        "failed": judged(document).numbers,
+        "certified": verdict_of(document).certified,
+        "failed": verdict_of(document).numbers,
         "summary": document["report"]["summary"],
         "poses_deg": round(apart.poses, 1),
         "moved_deg": None if apart.moved is None else round(apart.moved, 1),

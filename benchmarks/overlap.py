@@ -12,7 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjxgait.certification import judged
+from mjxgait.certification import verdict_of
 from mjxgait.certification.trials import simulate
 from mjxgait.creature import Creature
 from mjxgait.creature.overlap import NEAR, neighbours
@@ -80,7 +80,7 @@ def describe(folder: Path) -> str:
     passed, speed = "not examined", np.nan
     if (folder / CERTIFICATE).exists():
         text = json.loads((folder / CERTIFICATE).read_text(encoding="utf-8"))
-        passed, speed = "yes" if judged(text).certified else "no", text["report"]["speed"]
+        passed, speed = "yes" if verdict_of(text).certified else "no", text["report"]["speed"]
     return (
         f"| {folder.name} | {deep.max() * creature.frame.hip_height * 1e3:.1f} mm, {deep.max():.1%} "
         f"| {names} "

@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 from mjxgait.api import load_creature
-from mjxgait.certification import judged
+from mjxgait.certification import verdict_of
 from mjxgait.processes import python_command
 from mjxgait.tasks.walk.gaits import GAITS
 from mjxgait.tasks.walk.targets import NATURAL
@@ -77,7 +77,7 @@ def run(env: str, wish: list[str], seed: int, more: list[str]) -> dict:
         seconds = time.perf_counter() - began
         lines = (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
         certificate = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
-    verdict = judged(certificate)
+    verdict = verdict_of(certificate)
     failed = [f"{c.number} {m.name}" for c in verdict.failed for m in c.measures if not m.passed]
     likeness = certificate["report"]["likeness"]
     return {

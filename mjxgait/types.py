@@ -58,16 +58,7 @@ class Sensed:
     geom_pos: [G, 3] m, centres of the watched geoms. geom_low: [G] m, height of their lowest points
     above the ground under them.
     floor: [] m, height of the ground under the trunk; None where it is the plane z = 0.
-
-    The rest is for modular bodies; None for bodies of a model.
-    middle: [3] m, centre of all mass.
-    momentum: [3] kg·m/s, total.
-    washed: [3] N, total force of the water, 0 where there is none.
-    past: [] rad, largest excess of a hinge beyond its range.
-    sunk: [] depth of the deepest block in the ground, in units of the block's size (the cube root
-    of its volume); negative where all are above.
-    geom_rot: [G, 3, 3], rows are the own axes of each watched block in the world; only where vision
-    needs it.
+    body: a pytree of what only the plant's kind of bodies has; None for bodies of a model.
     """
 
     joint_pos: jax.Array
@@ -80,16 +71,11 @@ class Sensed:
     geom_pos: jax.Array
     geom_low: jax.Array
     floor: jax.Array | None = None
-    middle: jax.Array | None = None
-    momentum: jax.Array | None = None
-    washed: jax.Array | None = None
-    past: jax.Array | None = None
-    sunk: jax.Array | None = None
-    geom_rot: jax.Array | None = None
+    body: Any = None
 
 
 @pytree
-class Judged:
+class Evaluation:
     """Results of N genomes in R trials each.
 
     terms: [N, R, F], of the fitness. outcome: [N, R, O], metrics. failed: [N, R] whether the
@@ -104,7 +90,7 @@ class Judged:
 
 
 @pytree
-class Asked:
+class RequestedTrials:
     """Trials of some genomes to run, and the known results of the others.
 
     wanted: [B, N, R]. known: leaves [B, N, R, ...], NaN where unknown; its steps, [B], are those
@@ -112,14 +98,14 @@ class Asked:
     """
 
     wanted: Number
-    known: Judged
+    known: Evaluation
 
 
-Workings = TypeVar("Workings")
+StepData = TypeVar("StepData")
 Parameters = TypeVar("Parameters")
 
 
-class Plant(Protocol[Workings]):
+class Plant(Protocol[StepData]):
     """Batched physics, one step split around the controller.
 
     Every array has one more axis than documented on the state: the lanes, at position `lane_axis`
@@ -136,18 +122,18 @@ class Plant(Protocol[Workings]):
         """Note to the user about the choice of this plant; empty if there is none."""
         ...
 
-    def forward(self, state: BodyState) -> tuple[Sensed, Workings]:
+    def forward(self, state: BodyState) -> tuple[Sensed, StepData]:
         """Compute the current state's position and velocity dependent terms.
 
-        Also return the plant's step data (`workings`) for the two calls below.
+        Also return the plant's step data (`step_data`) for the two calls below.
         """
         ...
 
-    def solve_damped(self, workings: Workings, damping: jax.Array, force: jax.Array) -> jax.Array:
+    def solve_damped(self, step_data: StepData, damping: jax.Array, force: jax.Array) -> jax.Array:
         """Return accelerations `(M + diag(damping))^-1 force`; both arguments `[nv]` per lane."""
         ...
 
-    def advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
+    def advance(self, state: BodyState, step_data: StepData, torque: jax.Array) -> BodyState:
         """Return the state one `sim_dt` later under applied generalised forces `torque` `[nv]`.
 
         Friction passes through.
@@ -162,7 +148,7 @@ class Plant(Protocol[Workings]):
         ...
 
 
-class ModelPlant(Plant[Workings], Protocol[Workings, Parameters]):
+class ModelPlant(Plant[StepData], Protocol[StepData, Parameters]):
     """Physics of one creature's model with replaceable parameters."""
 
     @property
@@ -188,14 +174,14 @@ class ModelPlant(Plant[Workings], Protocol[Workings, Parameters]):
         """Return the plant of another body: constants as from `parameters_of`, or traced arrays."""
         ...
 
-    def heavier(self, parameters: Parameters, factor: Number) -> Parameters:
+    def with_mass_scale(self, parameters: Parameters, factor: Number) -> Parameters:
         """Return one body's parameters with masses and inertias times factor, [] or [nbody - 1].
 
         Dependent numbers (the weights of constraints) are computed anew.
         """
         ...
 
-    def resized(self, parameters: Parameters, factor: Number) -> Parameters:
+    def with_length_scale(self, parameters: Parameters, factor: Number) -> Parameters:
         """Return one body's parameters with each part's lengths times factor [nbody - 1].
 
         Its mass is scaled by the third power and its inertia by the fifth (`creature.scale`).

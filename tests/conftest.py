@@ -7,16 +7,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-# One cache of compiled programs for all workers and for the commands that tests start; without the
-# second line it keeps nothing that takes less than a second, of which there are hundreds.
+# One cache of compiled programs for all workers and for the commands that tests start. Without the
+# second line it omits the hundreds of programs that compile in less than a second.
 os.environ.setdefault(
     "JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 )
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
-# Compiling is what takes the time in most tests, and in the commands that they start; see
-# `as_shipped`.
+# Most tests and their commands spend most of their time on compilation; see `as_shipped`.
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
-# Runs are compared to the bit, and how lanes are dealt to devices decides on the last of them.
+# Runs are compared bit by bit, and the distribution of lanes to devices affects the last bit.
 os.environ["JAX_NUM_CPU_DEVICES"] = "2"
 
 import jax
@@ -28,17 +27,17 @@ from mjxgait.config.layers import data_folder
 from mjxgait.creature import Creature, load_creature
 
 OLDER = "--xla_cpu_use_fusion_emitters=false"
-"""XLA's older way from fused operations to machine code, which needs a third less of the compiler's time."""
-if version("jaxlib").startswith("0.10."):  # a flag that XLA does not know ends the process
+"""XLA's older code generation for fused operations, which needs a third less compile time."""
+if version("jaxlib").startswith("0.10."):  # an unknown flag ends the process
     os.environ["XLA_FLAGS"] = f"{OLDER} {os.environ.get('XLA_FLAGS', '')}".strip()
 
 FOLDERS = sorted(path.parent for path in data_folder("envs").glob("*/creature.toml"))
 SHIPPED = [path.name for path in FOLDERS if not load_creature(path).settings.creature.grows]
-"""Those that have a body before they are trained."""
+"""Creatures that have a body before training."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Options of tests/end_to_end."""
+    """Add the options of tests/end_to_end."""
     parser.addoption(
         "--thorough",
         action="store_true",
@@ -50,7 +49,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Skip tests marked `thorough`, unless `--thorough` is given or a planted fault is looked for."""
+    """Skip tests marked `thorough`, unless `--thorough` is given or a fault is planted."""
     if config.getoption("--thorough") or "MJXGAIT_PLANTED" in os.environ:
         return
     for item in items:
@@ -68,7 +67,7 @@ def pytest_collection_finish() -> None:
 
 
 MOST_MEMORY = 2 * 2**30
-"""Bytes of a worker above which compiled programs are dropped; the cache on the disk has them still."""
+"""Bytes of a worker above which compiled programs are dropped; the disk cache keeps them."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -90,14 +89,15 @@ def stool() -> Creature:
 
 @pytest.fixture(scope="session", params=SHIPPED)
 def shipped(request: pytest.FixtureRequest) -> Creature:
-    """Each creature that the program ships."""
+    """Each shipped creature."""
     return load_creature(data_folder("envs") / request.param)
 
 
 @pytest.fixture(scope="module")
 def emitted_as_shipped() -> Iterator[None]:
-    """Programs that are lowered and compiled, and commands that are started, are emitted as users get
-    them: in the older way bits depend on how many rows a program has.
+    """Generate code as users get it, for lowered and compiled programs and for started commands.
+
+    With the older code generation bits depend on the number of rows of a program.
     """
     flags, compile_it = os.environ.get("XLA_FLAGS", ""), jax.stages.Lowered.compile
 
@@ -114,7 +114,7 @@ def emitted_as_shipped() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def as_shipped(emitted_as_shipped: None) -> Iterator[None]:
-    """The same, and all optimizations."""
+    """`emitted_as_shipped` with all optimizations."""
     jax.config.update("jax_disable_most_optimizations", False)
     yield
     jax.config.update("jax_disable_most_optimizations", True)

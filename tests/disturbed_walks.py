@@ -1,4 +1,4 @@
-"""A small body that walks, disturbed in every way a start can be: what parity is tested on."""
+"""A small walking body with every disturbance of a start, for tests of parity."""
 
 import dataclasses
 from pathlib import Path
@@ -13,7 +13,7 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.reference import starts as examined
 from mjxgait.reference.outcome import Fall, Outcome
-from mjxgait.tasks.walk.stats import Tally
+from mjxgait.tasks.walk.stats import EpisodeStats
 
 STEP, SECONDS = 0.005, 1.2
 STEPS = round(SECONDS / STEP)
@@ -22,15 +22,18 @@ BUMPER = (
     '<geom name="bumper" type="sphere" size="0.02" pos="-0.2 0 -0.279" mass="0.1" '
     'contype="4" conaffinity="0"/>'
 )
-"""Touches the floor in livelier moments. Neither it nor the trunk is carried by the floor: in
-evolution nothing but feet is, and the examiner must not see another world."""
+"""Touches the floor in lively motion.
+
+The floor carries neither it nor the trunk: in evolution it carries only feet, and the reference
+simulator must have the same world.
+"""
 BODY = XML.replace(
     'mass="4" contype="0" conaffinity="1"/>', f'mass="4" contype="4" conaffinity="0"/>{BUMPER}'
 )
 TABLE = TOML.replace("torque_limit = 12.0", "torque_limit = 8.0").replace("[-45, 45]", "[-25, 40]")
 
 GENES_OF_THE_GAIT = {
-    "period": 0.4837,  # no pose falls on a step: float32 would decide which
+    "period": 0.4837,  # no pose falls on a step, where float32 would decide
     "steer": 1.0,
     "pitch": 0.3,
     "pitch_rate": 0.05,
@@ -54,9 +57,9 @@ PUSH_AT = 60
 
 @dataclasses.dataclass(frozen=True)
 class Disturbance:
-    """What is not nominal about a start.
+    """Deviations of a start from the nominal one.
 
-    push: m/s forward and left. gains: share of kp and kd. delay: steps that torques come late.
+    push: m/s forward and left. gains: share of kp and kd. delay: of torques, in steps.
     """
 
     friction: float = 1.0
@@ -73,7 +76,7 @@ DISTURBANCES = {
     "pushed forward": Disturbance(push=(0.3, 0.0)),
     "pushed to the left": Disturbance(push=(0.0, 0.25)),
     "joints displaced": Disturbance(joints=0.08),
-    # By 0.8 plain MJX in single precision ends elsewhere on some processors.
+    # With 0.8, plain MJX in single precision ends elsewhere on some processors.
     "joints moving": Disturbance(spin=0.9),
     "other gains": Disturbance(gains=0.3),
     "torques two steps late": Disturbance(delay=2),
@@ -82,14 +85,14 @@ DISTURBANCES = {
 }
 EPISODES = [(settings, disturbance) for settings in SETTINGS for disturbance in DISTURBANCES]
 FALL = Fall(touch=False)
-"""Lenient: where a touch ends an episode there are none to count."""
+"""A touch does not end an episode, or there would be none to count."""
 LENIENT = {"termination": {"touch": FALL.touch}, "latency": 2}
 CONFIGS = [small_config(**tables, rollout=LENIENT) for tables in SETTINGS.values()]
 """One per row of settings."""
 
 
 def make_body(folder: Path) -> Creature:
-    """The creature, written into a folder and loaded."""
+    """Write the creature into a folder and load it."""
     (folder / "creature.xml").write_text(BODY)
     (folder / "creature.toml").write_text(TABLE)
     return load_creature(folder)
@@ -107,7 +110,7 @@ def poses(creature: Creature) -> np.ndarray:
 
 
 def disturbed(creature: Creature) -> examined.Starts:
-    """The disturbances as the examiner knows them."""
+    """The disturbances as starts of the reference simulator."""
     rng = np.random.default_rng(1)
     plain = examined.nominal_starts(creature, len(DISTURBANCES))
     rows = list(DISTURBANCES.values())
@@ -132,7 +135,10 @@ def champion_of(creature: Creature, config: Config) -> Champion:
 
 
 def watched(creature: Creature) -> list[Outcome]:
-    """The examiner's, per settings; a frame more than an episode, for where the cycle goes next."""
+    """Outcomes of the reference simulator per settings.
+
+    Each has a frame more than an episode, for the next position in the cycle.
+    """
     rows = disturbed(creature)
     return [
         simulate(
@@ -156,14 +162,14 @@ COUNTS = {
 }
 EXACT = ("steps", "reason", "swings", "swinging", "foot_down")
 TOLERANCE = COUNTS | dict.fromkeys(EXACT, 0)
-"""Of what is counted, in steps; all else may differ by 0.1 mm, or rad, or ..., and 0.2 %."""
+"""Tolerances of counts, in steps; all else may differ by 1e-4 (m, rad, ...) plus 0.2 %."""
 UNCOMPARED = {
     "overlap": "looked at every 16 steps only; tests/physics/test_overlap.py holds it against C"
 }
-"""Fields of the tally that have no counterpart in `recorded_tally`, with the reason."""
-FIELDS = [field.name for field in dataclasses.fields(Tally) if field.name not in UNCOMPARED]
+"""Fields of the statistics without a counterpart in `recorded_stats`, with the reason."""
+FIELDS = [field.name for field in dataclasses.fields(EpisodeStats) if field.name not in UNCOMPARED]
 
 
 def tolerance(name: str, value: np.ndarray | float) -> float:
-    """By which another way may differ from a value."""
+    """Allowed difference from a value."""
     return TOLERANCE.get(name, 1e-4 + 2e-3 * float(np.abs(value).max()))

@@ -1,4 +1,4 @@
-"""What several tests need."""
+"""Helpers for several tests."""
 
 import dataclasses
 import tomllib
@@ -34,9 +34,9 @@ from mjxgait.tasks.base import in_order
 from mjxgait.tasks.starts import Starts
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import signed_weights, terms_under
-from mjxgait.training.blueprint import Plan
 from mjxgait.training.experiment import Batch
-from mjxgait.types import Asked, Judged
+from mjxgait.training.spec import SimulatorSpec
+from mjxgait.types import Evaluation, RequestedTrials
 
 STOOL = Path(__file__).parent / "data" / "stool"
 
@@ -50,7 +50,7 @@ def made_up_certificate(
     config: CertificateConfig | None = None,
     **others: Any,
 ) -> dict[str, Any]:
-    """The document of a certificate whose only criteria are those that failed, or one that passed."""
+    """Document of a certificate with only the failed criteria, or with one that passed."""
     sign = -1 if failed else 1
     criteria = tuple(
         Criterion(number, name, (Measure("speed", 0.5 + sign * margin, ">=", 0.5, 1.0),))
@@ -65,7 +65,7 @@ def made_up_certificate(
 def small_config(**tables: dict) -> Config:
     """A config for runs of a second: few individuals, short episodes.
 
-    Of the same shape as `test_run.SMALL`: they share its program.
+    It has the shape of `test_run.SMALL`, so both share a program.
     """
     table = {
         "evolution": {"population": 6, "generations": 3},
@@ -77,12 +77,12 @@ def small_config(**tables: dict) -> Config:
 
 
 def program_text(batch: Batch) -> str:
-    """That of all programs of a generation, before they are compiled."""
+    """Text of all programs of a generation, before compilation."""
     return "\n".join(program.as_text() for _, program in batch.lower())
 
 
 def altered(creature: Creature, **facts: Any) -> Creature:
-    """The creature with other facts: fields of a part as a mapping, or a fact of its own."""
+    """The creature with other facts; a mapping replaces fields of a part."""
     changes = {
         name: dataclasses.replace(getattr(creature, name), **value)
         if isinstance(value, Mapping)
@@ -93,7 +93,7 @@ def altered(creature: Creature, **facts: Any) -> Creature:
 
 
 def weight_vector(config: WalkConfig, generation: jax.Array) -> jax.Array:
-    """The weights [F] of walking in the order of its terms."""
+    """Weights [F] of the walk in the order of its terms."""
     return in_order(signed_weights(config, generation), terms_under(config.weights))
 
 
@@ -109,7 +109,7 @@ def pose_champion(
     drive: DriveConfig | None = None,
     **others: Any,
 ) -> Champion:
-    """A champion of key poses [K, J] that nobody evolved; tuning over `STILL`."""
+    """Champion with these key poses [K, J]. tuning: overrides `STILL`."""
     genes, names = STILL | dict(tuning), gene_names(creature.corrections.steps)
     given: dict[str, Any] = {"fitness": 0.0, "terms": {}, "origin": {}} | others
     return Champion(
@@ -125,7 +125,7 @@ def pose_champion(
 
 
 def said_by(capsys: pytest.CaptureFixture, *arguments: object, code: int) -> str:
-    """What a command says that ends with this code, in this process: none needs to be started."""
+    """Output of a command that must exit with this code; it runs in this process."""
     capsys.readouterr()
     with pytest.raises(SystemExit) as ended:
         main([*map(str, arguments)])
@@ -145,16 +145,16 @@ window = [0.5, 1.0]
 ladder = [0.2]
 ladder_count = 2
 """
-"""An examination of 3 s instead of 22, as a file of `certify --config`: not a verdict, but one."""
+"""Examination of 3 s instead of 22 s, as a file of `certify --config`; its result means nothing."""
 
 
 def short_examination() -> CertificateConfig:
-    """The same as settings."""
+    """`SHORT` as settings."""
     return build(CertificateConfig, tomllib.loads(SHORT), "short")
 
 
 class Shares:
-    """A tryout that knows what each is worth."""
+    """Pre-screening with known shares of successes by rank."""
 
     def __init__(self, *shares: float) -> None:
         self.known = shares
@@ -166,30 +166,30 @@ class Shares:
         return share - 0.9
 
 
-def made_up_judge(
-    blueprint: Plan,
+def made_up_evaluate(
+    spec: SimulatorSpec,
     numbers: object,
     settings: Config,
     starts: Starts,
     genomes: Any,
-    asked: Asked | None = None,
-) -> Judged:
-    """In place of `training.stages.judge`: a generation that simulates nothing and compiles soon.
+    requested: RequestedTrials | None = None,
+) -> Evaluation:
+    """Replacement of `training.stages.evaluate` that simulates nothing and compiles fast.
 
-    Key poses in the middle are the best, the higher the weight of speed the more; poses that are not
-    numbers have no value.
+    Key poses near zero are best, the more so the larger `fitness.speed`. Poses that are not finite
+    fail.
     """
-    task, poses = blueprint.own.task, genomes.key_poses
+    task, poses = spec.own.task, genomes.key_poses
     shape = (*poses.shape[:2], starts.friction.shape[1])
     worth = -jnp.asarray(settings.fitness.speed)[:, None] * jnp.square(poses).sum((2, 3))
     worth = worth[..., None, None] * starts.friction[:, None, :, None]
-    wanted = jnp.ones(shape, bool) if asked is None else jnp.asarray(asked.wanted)
+    wanted = jnp.ones(shape, bool) if requested is None else jnp.asarray(requested.wanted)
     lived = jnp.sum(wanted, axis=(1, 2), dtype=jnp.int32)
-    judged = Judged(
+    evaluation = Evaluation(
         terms=jnp.tile(worth, len(task.terms)),
         outcome=jnp.tile(worth, len(task.outcomes)),
         failed=~jnp.isfinite(worth[..., 0]),
         sim_steps=lived,
         computed_steps=lived,
     )
-    return judged if asked is None else completed(judged, asked)
+    return evaluation if requested is None else completed(evaluation, requested)

@@ -1,10 +1,10 @@
-"""Hands that evolve nobody, so that no program is compiled."""
+"""Backend without evolution, so that no program is compiled."""
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from viewing.made_up import metrics_line
+from rendering.made_up import metrics_line
 
 from mjxgait.distributed.jobs import Advanced, AdvanceRows
 from mjxgait.distributed.recipe import Programs, Recipe
@@ -16,7 +16,7 @@ PROGRAMS = Programs()
 
 
 class Pretend:
-    """Hands that evolve nobody: each generation bends all poses a little."""
+    """Backend without evolution: each job bends all poses by 0.01 rad."""
 
     def __init__(self) -> None:
         self._coming, self._work = [Worker(0, "here")], None
@@ -50,7 +50,7 @@ def pretended(recipe: Recipe, job: AdvanceRows) -> Advanced:
 
 
 class Interrupted(Scheduler):
-    """One that is told to stop after so many pieces of work."""
+    """Scheduler that stops after `left` jobs."""
 
     left = 3
 

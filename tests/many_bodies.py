@@ -1,4 +1,4 @@
-"""Bodies of one topology that differ in every number, and what C MuJoCo makes of them."""
+"""Bodies of one topology that differ in every number, and their simulation in C MuJoCo."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.types import BodyState, Plant
 
 XML = """
@@ -49,18 +49,18 @@ XML = """
     </body>
   </worldbody>
 </mujoco>"""
-"""A body with every kind of joint and contact that the fast physics knows."""
+"""A body with every kind of joint and contact that the lane-major physics supports."""
 WATCHED = ("toe", "heel", "trunk", "shin", "leg")
 SLIM = {"xla_backend_optimization_level": 0}
-"""Compiling is what takes the time here."""
+"""Compilation takes most of the time here."""
 
 Everything = tuple[Any, jax.Array, BodyState]
 
 
 def varied(xml: str, seed: int, most: float = 0.25) -> mujoco.MjModel:
-    """The model with its lengths, masses, springs, ranges and materials changed, each by its own.
+    """Change each length, mass, spring, range and material of the model independently.
 
-    most: share by which a number changes. It is compiled anew, so inertias and all else follow.
+    most: largest relative change. The model is compiled again, so inertias and all else follow.
     """
     spec, rng = mujoco.MjSpec.from_string(xml), np.random.default_rng(seed)
 
@@ -89,24 +89,24 @@ def varied(xml: str, seed: int, most: float = 0.25) -> mujoco.MjModel:
     return spec.compile()
 
 
-def layout_of(model: mujoco.MjModel, watched: Sequence[str] = WATCHED) -> SenseLayout:
-    """All hinges are driven."""
+def layout_of(model: mujoco.MjModel, watched: Sequence[str] = WATCHED) -> ObservationLayout:
+    """Layout in which all hinges are actuated."""
     hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
     geoms = np.array([model.geom(name).id for name in watched])
     trunk = model.body("trunk").id
-    return SenseLayout(trunk, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], geoms)
+    return ObservationLayout(trunk, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], geoms)
 
 
 @dataclasses.dataclass(frozen=True)
 class Moment:
-    """A state of every body, in NumPy with the lanes in front, and what pushes them: [L, nv]."""
+    """States, torques and damping [L, nv] of all bodies, in NumPy with lanes first."""
 
     state: BodyState
     torque: np.ndarray
     damping: np.ndarray
 
     def for_plant(self, plant: Plant, parameters: Any = None) -> tuple[BodyState, Any, Any]:
-        """With the lanes where the plant has them; parameters: leaves [L, ...]."""
+        """Move the lanes to the axis of the plant. parameters: leaves [L, ...]."""
         state = dataclasses.replace(self.state, parameters=parameters)
         rows = (state, self.torque, self.damping)
         return jax.tree.map(
@@ -114,13 +114,13 @@ class Moment:
         )
 
     def of(self, lane: int) -> "Moment":
-        """One lane, kept as such."""
+        """Return one lane and keep its axis."""
         rows = (self.state, self.torque, self.damping)
         return Moment(*jax.tree.map(lambda x: x[lane : lane + 1], rows))
 
 
 def moments(models: Sequence[mujoco.MjModel], seed: int = 1) -> Moment:
-    """Random states, of which some touch the floor."""
+    """Random states, some of which touch the floor."""
     rng, model = np.random.default_rng(seed), models[0]
     count = len(models)
     qpos = np.stack([m.qpos0 for m in models]) + 0.2 * rng.normal(size=(count, model.nq))
@@ -140,33 +140,33 @@ def moments(models: Sequence[mujoco.MjModel], seed: int = 1) -> Moment:
 
 
 def everything(plant: Plant) -> Callable[..., Everything]:
-    """From state, torque and damping to all that the plant's methods give."""
+    """Program from state, torque and damping to the results of all methods of the plant."""
 
     def program(state: BodyState, torque: jax.Array, damping: jax.Array) -> Everything:
-        sensed, workings = plant.forward(state)
-        solved = plant.solve_damped(workings, damping, torque)
-        return sensed, solved, plant.advance(state, workings, torque)
+        sensed, step_data = plant.forward(state)
+        solved = plant.solve_damped(step_data, damping, torque)
+        return sensed, solved, plant.advance(state, step_data, torque)
 
     return program
 
 
 def compiled(function: Callable[..., Any], *arguments: Any) -> Any:
-    """As quickly as possible."""
+    """Compile a function as fast as possible."""
     return jax.jit(function).lower(*arguments).compile(compiler_options=SLIM)
 
 
 def in_front(plant: Plant, results: Any) -> Any:
-    """Results in NumPy with the lanes in front."""
+    """Results in NumPy with lanes first."""
     return jax.tree.map(lambda x: np.moveaxis(np.asarray(x), plant.lane_axis, 0), results)
 
 
 def stacked(each: Sequence[Any]) -> Any:
-    """Numbers of many bodies, leaves [L, ...]."""
+    """Parameters of many bodies; leaves [L, ...]."""
     return jax.tree.map(lambda *leaves: np.stack(leaves), *each)
 
 
 def one_in_c(model: mujoco.MjModel, moment: Moment, steps: int = 0) -> mujoco.MjData:
-    """C MuJoCo's view of a moment of one lane; after so many steps, 0 for forward dynamics only."""
+    """Simulate one lane in C MuJoCo for `steps`; 0 computes forward dynamics only."""
     data, state = mujoco.MjData(model), jax.tree.map(lambda x: np.float32(x)[0], moment.state)
     data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = state.qpos, state.qvel, state.warmstart
     data.qfrc_applied[:] = np.float32(moment.torque[0])

@@ -1,4 +1,4 @@
-"""Processes that use a core each: who loses one says so, and does not wait for it."""
+"""One process per core: the loss of one is reported and not waited for."""
 
 import signal
 import subprocess
@@ -28,7 +28,7 @@ for _ in range(8):  # the moment decides
 """
 
 
-def test_a_process_that_is_killed_as_it_starts_is_not_waited_for():
+def test_a_process_killed_at_its_start_is_not_waited_for():
     done = subprocess.run(
         [sys.executable, "-c", LOSES_ONE], capture_output=True, text=True, timeout=60, check=False
     )
@@ -36,7 +36,7 @@ def test_a_process_that_is_killed_as_it_starts_is_not_waited_for():
 
 
 def test_ctrl_c_does_not_reach_a_process_that_is_importing():
-    """Its signal is held back from the start, and this process gets it again."""
+    """The signal is blocked there from the start; this process unblocks it again."""
     with process_per_core(1) as pool:
         held = pool.submit(signal.pthread_sigmask, signal.SIG_BLOCK, ()).result()
     assert signal.SIGINT in held

@@ -1,4 +1,4 @@
-"""Pages of the documentation: every link leads somewhere, and every page is found from the index."""
+"""Documentation: every link has a target, and the index links every page."""
 
 import re
 from pathlib import Path

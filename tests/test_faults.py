@@ -1,4 +1,4 @@
-"""The list of faults stays true, and the script that plants them can tell who catches what."""
+"""The list of faults is valid, and the script that plants them names the test that catches each."""
 
 import ast
 import importlib.util
@@ -31,8 +31,8 @@ def test_the_list_is_long_and_names_each_fault_once():
     assert len(FAULTS) == len(script.read_faults()) >= 30
 
 
-def test_the_docs_say_who_catches_each():
-    """A row for each in docs/research/faults.md, with its file; docs/testing.md has their number."""
+def test_the_docs_list_every_fault():
+    """docs/research/faults.md has a row with the file of each; docs/testing.md has their number."""
     rows = (ROOT / "docs" / "research" / "faults.md").read_text(encoding="utf-8")
     text = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
     places = {name: fault.file.removeprefix("mjxgait/") for name, fault in FAULTS.items()}
@@ -43,7 +43,7 @@ def test_the_docs_say_who_catches_each():
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_can_be_planted(name: str):
-    """Its text is there exactly once, what comes of it is Python, and the tests named exist."""
+    """Its text occurs exactly once, the result is valid Python, and the named tests exist."""
     fault = FAULTS[name]
     assert fault.why
     ast.parse(script.planted(fault))
@@ -65,8 +65,8 @@ MISSED = ("wrong divisor", "return x / 2", "return x / 3", "tests/test_toy.py")
 ROTTEN = ("gone", "return 4 * x", "return 5 * x", "tests/test_toy.py")
 
 
-def test_a_copy_lacks_what_is_made_and_nothing_else(tmp_path: Path):
-    """A room of the package may have the name of a folder of results."""
+def test_a_copy_omits_only_generated_files(tmp_path: Path):
+    """A package may have the name of a folder of results."""
     kept, left = ("toy/runs/loop.py", "tests/a.py"), ("runs/x/config.toml", ".git/HEAD")
     for name in (*kept, *left):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -77,13 +77,13 @@ def test_a_copy_lacks_what_is_made_and_nothing_else(tmp_path: Path):
 
 @pytest.fixture
 def few_plugins(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The tests of a toy tree start pytest a dozen times, and need no more than `-n 0` does."""
+    """Load only what `-n 0` needs: tests of a toy tree start pytest a dozen times."""
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     monkeypatch.setenv("PYTEST_PLUGINS", "xdist.plugin")
 
 
 def planting(folder: Path, *faults: tuple[str, str, str, str]) -> list[str]:
-    """The arguments with which the script plants these faults in a toy tree."""
+    """Arguments for the script to plant these faults in a toy tree."""
     for name, text in TOY.items():
         (folder / "tree" / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / "tree" / name).write_text(text)
@@ -97,7 +97,7 @@ def planting(folder: Path, *faults: tuple[str, str, str, str]) -> list[str]:
 
 
 @pytest.mark.usefixtures("few_plugins")
-def test_it_names_the_test_that_catches_a_fault(tmp_path: Path, capsys: pytest.CaptureFixture):
+def test_the_test_that_catches_a_fault_is_named(tmp_path: Path, capsys: pytest.CaptureFixture):
     assert script.main(planting(tmp_path, CAUGHT, BY_THE_REST)) == 0
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
     assert len(rows) == 3
@@ -106,14 +106,14 @@ def test_it_names_the_test_that_catches_a_fault(tmp_path: Path, capsys: pytest.C
 
 
 @pytest.mark.usefixtures("few_plugins")
-def test_it_fails_when_nothing_catches_a_fault(tmp_path: Path, capsys: pytest.CaptureFixture):
+def test_the_script_fails_if_nothing_catches_a_fault(tmp_path: Path, capsys: pytest.CaptureFixture):
     assert script.main([*planting(tmp_path, MISSED), "--trust"]) == 1
     assert "0 of 1 caught" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("few_plugins")
 def test_a_test_that_fails_anyway_has_caught_nothing(tmp_path: Path, capsys: pytest.CaptureFixture):
-    """It is not named for a fault, so the first run without one leaves it out."""
+    """No fault names it, so the first run without a fault omits it."""
     arguments = [*planting(tmp_path, MISSED), "--trust"]
     (tmp_path / "tree/tests/test_rest.py").write_text("def test_nothing():\n    assert False\n")
     assert script.main(arguments) == 1
@@ -130,13 +130,13 @@ def test_a_page_keeps_its_other_rows(tmp_path: Path):
     assert lines[-2:] == ["| b | `x.py` | w | `t::u` | `E   1` |", "| c | `y.py` | v | `t` | |"]
 
 
-def test_it_refuses_a_fault_whose_text_is_gone(tmp_path: Path):
+def test_a_fault_without_its_old_text_is_refused(tmp_path: Path):
     with pytest.raises(SystemExit, match=r'"gone": its old text is 0 times in toy\.py'):
         script.main(planting(tmp_path, ROTTEN))
 
 
 @pytest.mark.usefixtures("few_plugins")
-def test_it_refuses_to_begin_where_the_tests_fail_anyway(tmp_path: Path):
+def test_the_script_refuses_to_start_if_tests_fail_anyway(tmp_path: Path):
     arguments = planting(tmp_path, CAUGHT)
     (tmp_path / "tree" / "toy.py").write_text("def double(x):\n    return 2 * x + 1\n")
     (tmp_path / "faults.toml").write_text(

@@ -1,4 +1,4 @@
-"""What is read is a regular file within bounds; what is written is whole or as it was."""
+"""Reads accept only regular files within bounds; writes are complete or change nothing."""
 
 import errno
 import json
@@ -42,7 +42,7 @@ def device(path: Path) -> Path:
 
 @pytest.mark.skipif(os.name != "posix", reason="needs pipes and devices")
 @pytest.mark.parametrize("make", [folder, pipe, device])
-def test_what_is_no_file_is_refused_at_once(make, tmp_path: Path):
+def test_anything_but_a_regular_file_is_refused_at_once(make, tmp_path: Path):
     path = make(tmp_path / "champion.json")
     with pytest.raises(DamagedFile, match=f"^{path}: "):
         read_bytes(path)
@@ -62,20 +62,22 @@ def test_what_is_no_file_is_refused_at_once(make, tmp_path: Path):
         (rb'{"a": ["\u001b[2J"]}', "cannot be shown"),
     ],
 )
-def test_what_nothing_of_ours_writes_is_refused(content: bytes, words: str, tmp_path: Path):
+def test_content_that_the_program_never_writes_is_refused(
+    content: bytes, words: str, tmp_path: Path
+):
     path = put(tmp_path / "a.json", content)
     with pytest.raises(DamagedFile, match=words) as refused:
         read_text(path, 10) if words == "larger than" else read_json(path)
     assert str(path) in str(refused.value)
 
 
-def test_what_is_missing_is_said(tmp_path: Path):
+def test_a_missing_file_is_reported(tmp_path: Path):
     with pytest.raises(UserError, match="no such file"):
         read_json(tmp_path / "a.json")
     assert read_lines(tmp_path / "a.jsonl") == []
 
 
-def test_only_a_last_line_may_be_cut_off(tmp_path: Path):
+def test_only_the_last_line_may_be_cut_off(tmp_path: Path):
     path = put(tmp_path / "a.jsonl", b'{"a": 1}\n{"a": 2}\n{"a"')
     assert read_lines(path) == [{"a": 1}, {"a": 2}]
     for damaged in (b"5", b"[1, 2]", b'{"a"'):
@@ -99,7 +101,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pyt
     assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]
 
 
-def test_a_file_is_replaced_where_a_link_leads(tmp_path: Path):
+def test_a_link_stays_and_its_target_is_replaced(tmp_path: Path):
     real = put(tmp_path / "real.png", b"old")
     (tmp_path / "link.png").symlink_to(real)
     with replaced(tmp_path / "link.png") as beside:
@@ -109,12 +111,12 @@ def test_a_file_is_replaced_where_a_link_leads(tmp_path: Path):
     assert real.read_bytes() == b"new"
 
 
-def test_a_device_is_written_itself():
+def test_a_device_is_written_directly():
     write_text(Path(os.devnull), "text")
     assert not Path(os.devnull).is_file()
 
 
-def test_numbers_stay_what_they_are(tmp_path: Path):
+def test_json_values_survive_the_file(tmp_path: Path):
     held = {"a": [1, -2.5, None, True, "ü\n"], "b": {}}
     write_text(tmp_path / "a.json", json.dumps(held))
     assert read_json(tmp_path / "a.json") == held

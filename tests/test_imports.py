@@ -1,4 +1,4 @@
-"""Imports go one way, so that a part can be taken out and another put in; and no file is too long."""
+"""Imports go one way, so that a part can be replaced."""
 
 import ast
 import fnmatch
@@ -49,12 +49,12 @@ FLOORS = (
     ("config", "controllers/*/config", "tasks/*/*config", "tasks/walk/gaits"),
     ("creature/ground", "animation/clips"),
     ("types", "processes", "kinds"),
-    ("files", "latest"),
+    ("files", "lru"),
     ("errors",),
 )
-"""Patterns of modules and packages, from the top down: each may import from the floors below it, and
-from its own. The longest pattern that fits a file decides, so one slice has files on several
-floors.
+"""Patterns of modules and packages, from the top down: each may import from its own or lower ones.
+
+The longest matching pattern decides, so one package has files on several floors.
 """
 JAX_FREE = (
     "certification/*",
@@ -65,7 +65,7 @@ JAX_FREE = (
     "tasks/*/*criteria",
     "tasks/*/thresholds",
 )
-"""Modules that lead to no JAX: by their names a reader knows it."""
+"""Modules that lead to no JAX, as their names show."""
 
 
 def name_of(path: Path) -> str:
@@ -85,7 +85,7 @@ def floor(path: Path) -> int:
 
 
 def imports(path: Path) -> Iterator[str]:
-    """All that a file imports, wherever in it, as dotted names."""
+    """All imports anywhere in a file, as dotted names."""
     return imports_in(ast.parse(path.read_text(encoding="utf-8")))
 
 
@@ -111,12 +111,12 @@ def test_imports_go_down(path: Path):
 
 
 def is_bare(path: Path) -> bool:
-    """Whether it is the `__init__` of a package that imports nothing."""
+    """Whether a file is an `__init__` without imports."""
     return path.name == "__init__.py" and not list(imports(path))
 
 
 @pytest.mark.parametrize("pattern", JAX_FREE)
-def test_what_is_free_of_jax_is_known_by_its_name(pattern: str):
+def test_files_named_as_free_of_jax_lead_to_no_jax(pattern: str):
     found = [p for p in files() if fnmatch.fnmatchcase(name_of(p), pattern)]
     assert found
     for path in found:
@@ -139,20 +139,20 @@ def at_import(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def packages_of(path: Path) -> set[Path]:
-    """The `__init__` of each package that a file lies in."""
+    """The `__init__` of each package around a file."""
     inits = {folder / "__init__.py" for folder in path.parents if folder.is_relative_to(PACKAGE)}
     return inits - {path}
 
 
 def needs(path: Path) -> set[Path]:
-    """Files that are run before a file has been imported, but for those of its own packages."""
+    """Files that run during the import of a file, except those of its own packages."""
     tree = ast.Module(list(at_import(ast.parse(path.read_text(encoding="utf-8")))), [])
     found = {f for name in imports_in(tree) for f in modules_of(name) if name.startswith("mjxgait")}
     return {g for f in found for g in (f, *packages_of(f))} - {path} - packages_of(path)
 
 
 def test_any_module_may_be_imported_first():
-    """No file, and no `__init__` of a package, needs itself."""
+    """No file needs itself, nor does the `__init__` of a package."""
     arrows = {path: needs(path) for path in files()}
     while arrows:
         free = {path for path, below in arrows.items() if not below & set(arrows)}
@@ -161,7 +161,7 @@ def test_any_module_may_be_imported_first():
 
 
 def reached(name: str) -> set[str]:
-    """All that a module leads to, inside the package and outside."""
+    """All direct and indirect imports of a module, inside the package and outside."""
     seen: set[str] = set()
     waiting = [name]
     while waiting:
@@ -178,7 +178,7 @@ def leads_to(name: str, package: str) -> bool:
 
 
 @pytest.mark.parametrize("module", ["mjxgait.evolution.evolution", "mjxgait.evolution.variation"])
-def test_evolution_does_not_know_what_a_genome_drives(module: str):
+def test_evolution_does_not_depend_on_what_a_genome_controls(module: str):
     for forbidden in (
         "mujoco",
         "mjxgait.creature.creature",
@@ -189,8 +189,8 @@ def test_evolution_does_not_know_what_a_genome_drives(module: str):
 
 
 @pytest.mark.parametrize("own", ["controllers", "tasks", "evolution", "simulation"])
-def test_what_is_compiled_leaves_mujoco_to_the_physics(own: str):
-    """Controllers, tasks and operators compute with arrays; a model is the physics' and the creature's."""
+def test_compiled_code_leaves_mujoco_to_the_physics(own: str):
+    """Controllers, tasks and operators use arrays; only physics and creatures use a model."""
     reference = "controllers/sims_brain/reference_*"
     for path in (PACKAGE / own).rglob("*.py"):
         if fnmatch.fnmatchcase(name_of(path), reference):
@@ -198,8 +198,8 @@ def test_what_is_compiled_leaves_mujoco_to_the_physics(own: str):
         assert "mujoco" not in {name.split(".")[0] for name in imports(path)}, path.name
 
 
-def test_only_one_place_jits():
-    """One program per run: a second jit elsewhere would be a second compile."""
+def test_only_one_file_calls_jit():
+    """A run has one program: a second jit elsewhere would be a second compilation."""
     ours = [
         PACKAGE / name for name in ("controllers", "tasks", "evolution", "simulation", "training")
     ]

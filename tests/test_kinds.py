@@ -34,12 +34,12 @@ def test_a_task_has_all_of_its_parts(kind):
     assert (acceptance.drag > 0) == kind.water == in_water(kind.name)
 
 
-def test_a_name_may_mean_another_task_to_a_body_that_grows():
+def test_a_name_may_mean_another_task_for_modular_bodies():
     assert meant_of_grown("walk") == "roam"
     assert meant_of_grown("swim") == "swim"
 
 
-def test_a_folder_is_all_that_a_new_task_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_new_task_needs_only_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     home = tmp_path / "still"
     home.mkdir()
     (home / "__init__.py").write_text(STILL)

@@ -1,4 +1,4 @@
-"""No process of ours runs code that lies in the folder that the user stands in."""
+"""No process of the program runs code from the current folder."""
 
 import os
 import signal
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from viewing.made_up import treading, write_run
+from rendering.made_up import treading, write_run
 
 from mjxgait.bench.scaling import Point, measure
 from mjxgait.creature import Creature
@@ -29,7 +29,7 @@ NAMES = ("json", "numpy", "multiprocessing", "struct", "pickle", "mujoco", "mjxg
 
 @pytest.fixture
 def marker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The file that hostile modules write, in a current folder that is full of them."""
+    """File that hostile modules in the current folder write."""
     marker, hostile = tmp_path / "marker", tmp_path / "hostile"
     for name in NAMES:
         (hostile / name).mkdir(parents=True)
@@ -43,13 +43,13 @@ def imports(run: Path, creature: Creature) -> None:
 
 
 def renders(run: Path, creature: Creature) -> None:
-    """The worker ends at once, for there is no such backend; its modules are imported."""
+    """The worker imports its modules and ends at once, as there is no such backend."""
     walk = record_walk(creature, treading(creature), 0.2)
     assert working_backend(Stage([walk], 64, 48), "nonsense")[0] is None
 
 
 def benchmarks(run: Path, creature: Creature) -> None:
-    """The process that measures a point ends at a creature that is none."""
+    """The process that measures a point ends at an unknown creature."""
     with pytest.raises(subprocess.CalledProcessError) as failed:
         measure("no-creature", Point())
     assert "no-creature" in failed.value.stderr
@@ -61,15 +61,15 @@ def examines(run: Path, creature: Creature) -> None:
 
 
 @pytest.mark.parametrize("act", [imports, renders, benchmarks, examines])
-def test_a_folder_of_hostile_modules_runs_no_code(
+def test_hostile_modules_in_the_current_folder_do_not_run(
     act: Callable[[Path, Creature], None], marker: Path, stool: Creature, tmp_path: Path
 ):
     act(write_run(tmp_path / "run", stool), stool)
     assert not marker.exists(), marker.read_text()
 
 
-def test_the_trap_is_one(marker: Path):
-    """Started as Python does by itself, a process runs what lies in the folder."""
+def test_the_trap_works(marker: Path):
+    """With Python's own defaults a process runs code from the current folder."""
     plain = {name: value for name, value in os.environ.items() if name not in SAFE_PATH}
     command = python_command("json.tool", "--help")
     subprocess.run(command, check=True, capture_output=True, env=plain)
@@ -87,10 +87,10 @@ with following(Path(sys.argv[1])):
 """
 
 
-def test_the_page_of_a_training_ends_with_it_and_runs_no_code(
+def test_the_dashboard_ends_with_its_training_and_runs_no_code(
     marker: Path, stool: Creature, tmp_path: Path
 ):
-    """Ended by SIGKILL, which no program can catch; SIGTERM, which this one leaves, is no more."""
+    """SIGKILL, which no program can catch, ends the training; outside POSIX SIGTERM does so."""
     run = write_run(tmp_path / "run", stool)
     command = [sys.executable, "-P", "-c", FOLLOWS, str(run)]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
@@ -101,7 +101,7 @@ def test_the_page_of_a_training_ends_with_it_and_runs_no_code(
             assert answer.read()
         training.send_signal(signal.SIGKILL if os.name == "posix" else signal.SIGTERM)
         training.wait()
-        assert training.stdout.read() == ""  # the page's process has it open as long as it runs
+        assert training.stdout.read() == ""  # the dashboard keeps it open while it runs
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(address, timeout=10)
     assert not marker.exists(), marker.read_text()

@@ -96,11 +96,11 @@ def train(
       UserError: an invalid argument, explained in one sentence.
     """
     from mjxgait.controllers.expressions.written import with_expressions
-    from mjxgait.tasks.walk.targets import Wishes, configured
+    from mjxgait.tasks.walk.targets import WalkTargets, configured
 
     use = _use(controller=controller, task=task)
     creature = load_creature(env, scale, way=way)
-    asked = {
+    requested = {
         "speed": speed,
         "gait": gait,
         "turn": turn,
@@ -109,7 +109,7 @@ def train(
         "certificate": certificate,
     }
     file = Path(config) if config else None
-    resolved = configured(creature, file, use, Wishes.of(asked))
+    resolved = configured(creature, file, use, WalkTargets.of(requested))
     short = {"population": population, "generations": generations}
     evolution = {key: value for key, value in short.items() if value is not None}
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
@@ -253,13 +253,13 @@ def examine_expressions(
     """
     from mjxgait.controllers.expressions.written import written_champion
     from mjxgait.plugins.fit import check_fit
-    from mjxgait.tasks.walk.targets import Wishes, configured
+    from mjxgait.tasks.walk.targets import WalkTargets, configured
 
     table = read_toml(Path(config)) if config else {}
     thresholds = build(CertificateConfig, table, str(config))
     use = {"controller": "program"} | ({"task": task} if task else {})
     creature = load_creature(env)
-    settings = configured(creature, None, use, Wishes())
+    settings = configured(creature, None, use, WalkTargets())
     check_fit(creature, settings)
     creature = at_step(creature, settings.rollout.step).on(settings.rollout.ground)
     return certify(creature, written_champion(creature, settings, Path(file)), thresholds)

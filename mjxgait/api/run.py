@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mjxgait.certification import judged, outdated, read_certificate
+from mjxgait.certification import outdated, read_certificate, verdict_of
 from mjxgait.certification.verdict import Document
 from mjxgait.champion import Champion
 from mjxgait.config.schema import Config
@@ -62,7 +62,7 @@ class Run:
     def certified(self) -> bool:
         """True if the champion passed every criterion of the shipped rules on its ground."""
         document = self.certificate
-        if document is None or not judged(document).certified:
+        if document is None or not verdict_of(document).certified:
             return False
         return outdated(document, self.champion, self.creature) is None
 

@@ -145,7 +145,7 @@ def _inner(params: Mapping[str, object]) -> "Iterator[Jaxpr]":
 
 
 def step_cost(experiment: Experiment) -> dict[str, float]:
-    """Return the cost per creature and step, controller and tally included.
+    """Return the cost per creature and step, controller and episode statistics included.
 
     flops_asked: floating-point operations of the program as written. flops: of the compiled one as
     XLA counts them; it computes some values twice rather than store them. bytes: read and written

@@ -27,7 +27,7 @@ from mjxgait.training.folder import EXAMS
 from mjxgait.training.generation import evolution_of, next_starts
 from mjxgait.training.screen import Screen
 from mjxgait.training.stages import prepare_devices
-from mjxgait.types import Judged
+from mjxgait.types import Evaluation
 
 
 class Ours:
@@ -143,13 +143,13 @@ def _operators(experiment: Experiment) -> float:
     task, count = experiment.simulator.task, experiment.config.evolution.offspring
     trials = experiment.config.rollout.starts
 
-    def stub(genomes: Genome) -> Judged:
+    def stub(genomes: Genome) -> Evaluation:
         terms = jnp.mean(genomes.key_poses, axis=(1, 2))[:, None, None] * jnp.ones(
             (1, trials, len(task.terms))
         )
         outcome = jnp.zeros((count, trials, len(task.outcomes)))
         failed = jnp.zeros((count, trials), bool)
-        return Judged(terms, outcome, failed, jnp.int32(1), jnp.int32(1))
+        return Evaluation(terms, outcome, failed, jnp.int32(1), jnp.int32(1))
 
     evolution = evolution_of(experiment.simulator, experiment.row.settings)
 

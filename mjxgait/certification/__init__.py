@@ -17,8 +17,8 @@ from mjxgait.certification.validity import outdated, read_certificate, read_stre
 from mjxgait.certification.verdict import (
     Verdict,
     criteria_of,
-    judge,
-    judged,
+    verdict_of,
+    verdict_on,
 )
 
 __all__ = [
@@ -31,8 +31,6 @@ __all__ = [
     "certify",
     "criteria_of",
     "distance",
-    "judge",
-    "judged",
     "nominal_check",
     "outdated",
     "push_ladder",
@@ -41,4 +39,6 @@ __all__ = [
     "record",
     "rehearse",
     "survival",
+    "verdict_of",
+    "verdict_on",
 ]

@@ -41,11 +41,11 @@ class AcceptanceCriteria(Protocol):
     worth: float
     """Least share of successful trials in evolution for an individual to be worth validating."""
 
-    def asked(self, wish: Wish) -> "AcceptanceCriteria":
+    def with_targets(self, wish: Wish) -> "AcceptanceCriteria":
         """Return the criteria with those of the requested targets, by name."""
         ...
 
-    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+    def commanded_heading(self, steps: int, time_step: float) -> np.ndarray | None:
         """Commanded heading [T] in rad at each control step; None if none."""
         ...
 
@@ -56,7 +56,7 @@ class AcceptanceCriteria(Protocol):
         ...
 
     def obeyed(
-        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+        self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """Evaluate how these headings [S, T] were followed."""
         ...
@@ -86,7 +86,7 @@ class AcceptanceCriteria(Protocol):
         """
         ...
 
-    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         """Return the next goals, m ahead of the start.
 
         goal: current ones. first: those at the start. way: m of the trunk ahead of the start.
@@ -136,40 +136,42 @@ def promising(
 
 
 class Unasked:
-    """See `AcceptanceCriteria`: for a task without targets.
+    """Implementation of `AcceptanceCriteria`: for a task without targets.
 
     revision: see `AcceptanceCriteria`.
     """
 
     revision: int = 0
 
-    def asked(self, wish: Wish) -> Any:
-        """See `AcceptanceCriteria`: the same."""
+    def with_targets(self, wish: Wish) -> Any:
+        """Return these criteria: targets add none."""
         return self
 
-    def told(self, steps: int, time_step: float) -> np.ndarray | None:
-        """See `AcceptanceCriteria`: straight ahead."""
+    def commanded_heading(self, steps: int, time_step: float) -> np.ndarray | None:
+        """Command no heading: straight ahead."""
         return None
 
     def commands(
         self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
     ) -> np.ndarray | None:
-        """See `AcceptanceCriteria`: none."""
+        """Command no headings."""
         return None
 
     def obeyed(
-        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+        self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: nothing was commanded."""
+        """Return no criteria: nothing was commanded."""
         return ()
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `AcceptanceCriteria`: those that are down."""
+        """Mask of the simulations that are down."""
         return ~outcome.stayed_up
 
 
 class StaysUp(Unasked):
-    """See `AcceptanceCriteria`: criteria 4 and 5 for tasks with no goal but to be up at the end.
+    """Implementation of `AcceptanceCriteria`.
+
+    Criteria 4 and 5 for tasks with no goal but to be up at the end.
 
     drag, pushed, by_pushes, grown, leaps, worth: see `AcceptanceCriteria`.
     """
@@ -182,33 +184,33 @@ class StaysUp(Unasked):
     worth: float = 1.0
 
     def fall(self, config: CertificateConfig) -> Fall:
-        """See `AcceptanceCriteria`: as criterion 1 has it."""
+        """Return the conditions of criterion 1."""
         return config.upright
 
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `AcceptanceCriteria`: as they are."""
+        """Return the starts unchanged."""
         return starts
 
-    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """See `AcceptanceCriteria`: the same."""
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """Keep the goals."""
         return goal
 
     def kept(
         self, champion: Champion, whole: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: evolution has promised nothing."""
+        """Return no criteria: evolution has promised nothing."""
         return ()
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `AcceptanceCriteria`: those that have stayed up."""
+        """Mask of the simulations that stayed up."""
         return outcome.stayed_up
 
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: 4 and 5."""
+        """Evaluate criteria 4 and 5."""
         return criteria.starts(started, config), criteria.pushes(pushed, config)
 
 
@@ -229,7 +231,7 @@ class HasCriteria(Protocol):
 
 
 class PlainCriteria(StaysUp):
-    """See `AcceptanceCriteria`."""
+    """Implementation of `AcceptanceCriteria`."""
 
     verdict = "it does what its task demands"
 
@@ -239,7 +241,7 @@ class PlainCriteria(StaysUp):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: stays up, at half the time step too; physics, parts, and its own."""
+        """Stays up, at half the time step too; physics, parts, and its own."""
         window = whole.window(config.warmup)
         repeated = self._basic(halved, config)
         failed = sum(not m.passed for c in repeated for m in c.measures)
@@ -263,7 +265,7 @@ class PlainCriteria(StaysUp):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `AcceptanceCriteria`: to the end."""
+        """Whether the episode lasts to the end."""
         return to_the_end(outcome, seconds, creature)
 
     def _basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
@@ -277,13 +279,13 @@ def acceptance_of(task: str, wish: Wish | None = None) -> AcceptanceCriteria:
     Raises:
       UserError: the task is user-defined code that was not named.
     """
-    return _made(task_kind(task)).asked(wish or {})
+    return _made(task_kind(task)).with_targets(wish or {})
 
 
 def how_simulated(task: str, wish: Wish | None = None) -> AcceptanceCriteria | StaysUp:
     """Return a task's goals, falls and turns for a simulation; the usual ones if it is unknown."""
     kind = known_task(task)
-    return (_made(kind) if kind else StaysUp()).asked(wish or {})
+    return (_made(kind) if kind else StaysUp()).with_targets(wish or {})
 
 
 @functools.cache

@@ -14,7 +14,7 @@ from mjxgait.certification.check_body import check_body
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
 from mjxgait.certification.trials import AIMS, simulate, told_to_turn
-from mjxgait.certification.verdict import Document, MeasureEntry, Verdict, judge, judged
+from mjxgait.certification.verdict import Document, MeasureEntry, Verdict, verdict_of, verdict_on
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording, measure
@@ -53,17 +53,17 @@ class Certificate:
     @property
     def passed(self) -> bool:
         """True if there are criteria and all of them pass."""
-        return judge(self.criteria).passed
+        return verdict_on(self.criteria).passed
 
     @property
     def margin(self) -> float:
         """Margin of the worst criterion, which ranks candidates; positive when all pass."""
-        return judge(self.criteria).margin
+        return verdict_on(self.criteria).margin
 
     @property
     def verdict(self) -> Verdict:
         """Result that a reader derives from the stored file."""
-        return judged(self.document())
+        return verdict_of(self.document())
 
     def rows(self) -> list[tuple[str, str, str, str, str]]:
         """Return a table: criterion, measure, value, threshold, result."""
@@ -122,7 +122,7 @@ class NominalCheck:
     @property
     def margin(self) -> float:
         """Margin of the worst of its criteria."""
-        return judge(self.criteria).margin
+        return verdict_on(self.criteria).margin
 
 
 def nominal_check(
@@ -186,7 +186,7 @@ def certify(
     started = float(np.split(acceptance.succeeded(outcome, starts, config), ends)[1].mean())
     found = acceptance.disturbed(started, pushed[0] if pushed else np.nan, config)
     found += told_to_turn(creature, champion, config, draw, threads)
-    judged = sorted((*seen.criteria, *found), key=lambda c: c.number)
+    tested = sorted((*seen.criteria, *found), key=lambda c: c.number)
     report = acceptance.report(seen.whole, config) | {"ground": str(creature.terrain)}
     if pushed:
         sizes = (0.0, config.pushes.speed, *config.pushes.ladder)
@@ -196,7 +196,7 @@ def certify(
         creature.digest,
         champion.task,
         champion.fingerprint,
-        tuple(judged),
+        tuple(tested),
         report,
         config,
         time.perf_counter() - began,

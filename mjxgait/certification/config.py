@@ -171,7 +171,7 @@ class PartsConfig:
 
 
 @dataclasses.dataclass(frozen=True)
-class WishesConfig:
+class TargetsConfig:
     """Criteria 10 and 11: tolerances of the walk targets (docs/guide/gaits.md).
 
     Attributes:
@@ -220,7 +220,7 @@ class CertificateConfig:
     gait: GaitConfig = dataclasses.field(default_factory=GaitConfig)
     physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
     parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
-    wishes: WishesConfig = dataclasses.field(default_factory=WishesConfig)
+    wishes: TargetsConfig = dataclasses.field(default_factory=TargetsConfig)
     hop: HopConfig = dataclasses.field(default_factory=HopConfig)
     limbo: LimboConfig = dataclasses.field(default_factory=LimboConfig)
     travel: TravelConfig = dataclasses.field(default_factory=TravelConfig)

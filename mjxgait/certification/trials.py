@@ -17,7 +17,7 @@ import numpy as np
 from mjxgait.certification.acceptance import acceptance_of, how_simulated
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
-from mjxgait.certification.verdict import judge
+from mjxgait.certification.verdict import verdict_on
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.processes import cores
@@ -136,14 +136,14 @@ def simulate(
     fall = fall or task.fall(CertificateConfig())
     starts = task.aimed(starts, CertificateConfig())
     if heading is None:
-        heading = task.told(steps, creature.model.opt.timestep)
-    told = None if heading is None else np.broadcast_to(heading, (len(starts), steps))
+        heading = task.commanded_heading(steps, creature.model.opt.timestep)
+    commanded = None if heading is None else np.broadcast_to(heading, (len(starts), steps))
 
     def run(share: np.ndarray) -> Outcome:
         mine, kept = starts.rows(share), int((share < record).sum())
         stepping = Stepping(creature, champion, mine, kept, fall, task, twin)
         tell = None if watch is None else partial(watch.tell, share)
-        return stepping.to_the_end(steps, None if told is None else told[share], tell)
+        return stepping.to_the_end(steps, None if commanded is None else commanded[share], tell)
 
     with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
         parts = list(pool.map(run, shares))
@@ -172,15 +172,15 @@ def told_to_turn(
     """Evaluate steering by drawn headings from perturbed starts; empty if none are commanded."""
     acceptance, step = acceptance_of(champion.task, champion.wish), creature.model.opt.timestep
     steps = round(STEERED_FOR / step)
-    told = acceptance.commands(config, steps, step, draw.generator(COMMANDS))
-    if told is None:
+    commanded = acceptance.commands(config, steps, step, draw.generator(COMMANDS))
+    if commanded is None:
         return ()
-    begun = starts(creature, config, draw, len(told))
+    begun = starts(creature, config, draw, len(commanded))
     fall = acceptance.fall(config)
     outcome = simulate(
-        creature, champion, begun, STEERED_FOR, heading=told, fall=fall, threads=threads
+        creature, champion, begun, STEERED_FOR, heading=commanded, fall=fall, threads=threads
     )
-    return acceptance.obeyed(outcome, told, config)
+    return acceptance.obeyed(outcome, commanded, config)
 
 
 def rehearse(
@@ -241,4 +241,4 @@ def _cautious(well: np.ndarray, caution: float) -> float:
 
 def _worst(criteria: Sequence[Criterion]) -> float:
     """Margin of the worst criterion; infinite without criteria, so that it limits nothing."""
-    return judge(criteria).margin if criteria else np.inf
+    return verdict_on(criteria).margin if criteria else np.inf

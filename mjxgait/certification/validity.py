@@ -11,7 +11,7 @@ import pydantic
 from mjxgait.certification.certificate import schema_of
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.certification.stress import TRIALS, StressConfig
-from mjxgait.certification.verdict import Document, criteria_of, judged
+from mjxgait.certification.verdict import Document, criteria_of, verdict_of
 from mjxgait.champion import Champion
 from mjxgait.config.tables import STORED, Flag, Index, Number, Text, check
 from mjxgait.creature import Creature
@@ -208,7 +208,7 @@ def differences(stored: Document, again: Document) -> list[str]:
     named["ground"] = (stored.get("report", {}).get("ground"), again["report"]["ground"])
     found = [f"{key}: {one}, again {two}" for key, (one, two) in named.items() if one != two]
     found += _measures(criteria_of(stored), criteria_of(again))
-    if said := judged(stored).contradiction:
+    if said := verdict_of(stored).contradiction:
         found.append(said)
     return found
 

@@ -96,17 +96,17 @@ class Verdict:
         return f"fails {', '.join(names)}{f' and {more} more' if more > 0 else ''}"
 
 
-def judge(criteria: Sequence[Criterion]) -> Verdict:
+def verdict_on(criteria: Sequence[Criterion]) -> Verdict:
     """Evaluate these criteria; without any, the result is not passed."""
     failed = tuple(criterion for criterion in criteria if not criterion.passed)
     margin = min((criterion.margin for criterion in criteria), default=-np.inf)
     return Verdict(bool(criteria) and not failed, margin, failed)
 
 
-def judged(certificate: Mapping[str, Any]) -> Verdict:
+def verdict_of(certificate: Mapping[str, Any]) -> Verdict:
     """Evaluate a stored certificate, a `Document`; see `validity.read_certificate`."""
     document = cast(Document, certificate)
-    verdict = judge(criteria_of(document))
+    verdict = verdict_on(criteria_of(document))
     return dataclasses.replace(
         verdict,
         other_rules=tuple(other_rules(document)),

@@ -62,7 +62,10 @@ class Serializer(Protocol[Settings]):
 
 
 class PlainSerializer(Serializer[Settings]):
-    """See `Serializer`: arrays as nested lists under their names. Other serializers inherit from it."""
+    """Implementation of `Serializer`.
+
+    Arrays as nested lists under their names. Other serializers inherit from it.
+    """
 
     @override
     def settled(self, genome: Genome, creature: Creature) -> dict[str, np.ndarray]:
@@ -77,7 +80,7 @@ class PlainSerializer(Serializer[Settings]):
         return {name: np.array(values, float) for name, values in document.items()}
 
     def settings(self, table: Mapping[str, object], where: str) -> Any:
-        """See `Serializer`: the table unparsed; it is parsed where the controller is available."""
+        """The table unparsed; it is parsed where the controller is available."""
         return dict(table)
 
     @override

@@ -108,7 +108,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
         check_variants(plan, creature, where)
     # JAX takes a second to import, so the study is checked first.
     from mjxgait.experiments.ablation.rows import groups
-    from mjxgait.training.blueprint import check_plan
+    from mjxgait.training.spec import check_spec
     from mjxgait.training.stages import prepare_devices
 
     prepare_devices()
@@ -130,7 +130,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
     if not options.resume:
         _check_new(folder)
         for runs in parts:
-            check_plan(creature, runs[0].config)
+            check_spec(creature, runs[0].config)
         begin = partial(_create, folder, study, creature)
     if not _run(folder, creature, plan, screen, options.cluster, begin):
         print(f"interrupted; go on with: mjxgait ablate --resume {folder}")

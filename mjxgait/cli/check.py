@@ -11,7 +11,7 @@ from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.files import replaced
-from mjxgait.tasks.walk.targets import Wishes, configured
+from mjxgait.tasks.walk.targets import WalkTargets, configured
 from mjxgait.training.stored import require_writable
 
 
@@ -35,7 +35,7 @@ def check_command(arguments: Sequence[str]) -> int:
     options = tyro.cli(CheckOptions, args=list(arguments), prog="mjxgait check")
     folder = Path(options.env)
     creature = load_creature(folder if folder.is_dir() else find_creature(options.env))
-    configured(creature, None, {}, Wishes())
+    configured(creature, None, {}, WalkTargets())
     if not creature.settings.creature.grows:
         check_body(creature)
     from mjxgait.importer.portrait import facts, portrait, standing

@@ -107,12 +107,12 @@ def refine_command(arguments: Sequence[str]) -> int:
 
 def _check(creature: Creature, config: Config) -> None:
     """Refuse an invalid creature or config before anything is written."""
-    from mjxgait.training.blueprint import check_plan
+    from mjxgait.training.spec import check_spec
     from mjxgait.training.stages import prepare_devices
 
     check_parts(creature, config)
     prepare_devices()
-    check_plan(creature, config)
+    check_spec(creature, config)
 
 
 def _front(out: Path, runs: Sequence[Path]) -> int:

@@ -18,7 +18,7 @@ from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
 from mjxgait.files import replaced, write_text
 from mjxgait.plugins import resolve_config
-from mjxgait.tasks.walk.targets import Wishes, speed_of, wished
+from mjxgait.tasks.walk.targets import WalkTargets, speed_of, with_targets
 from mjxgait.training.folder import (
     check_parts,
     create_run,
@@ -155,12 +155,12 @@ def begin(plan: Planned) -> None:
     """Make the folder, with a run folder per cell.
 
     Raises:
-      UserError: see `check_plan`; or the folder cannot be written.
+      UserError: see `check_spec`; or the folder cannot be written.
     """
-    from mjxgait.training.blueprint import check_plan
+    from mjxgait.training.spec import check_spec
 
     folder, cells = plan.folder, plan.grid.cells
-    check_plan(plan.creature, plan.configs[cells[0]])
+    check_spec(plan.creature, plan.configs[cells[0]])
     with disk_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
     for cell in cells:
@@ -185,7 +185,7 @@ def _resumed(options: RepertoireOptions) -> tuple[Path, Grid]:
 def _settings(options: RepertoireOptions, creature: Creature) -> Config:
     """Return the settings that all walks share."""
     config = resolve_config(creature.settings.train, creature.name, Path(options.config))
-    config = wished(config, creature, Wishes(gait=options.gait, style=options.style))
+    config = with_targets(config, creature, WalkTargets(gait=options.gait, style=options.style))
     short = {"population": options.population, "generations": options.generations}
     table: dict[str, object] = {"evolution": {k: v for k, v in short.items() if v is not None}}
     table |= {} if options.seed is None else {"seed": options.seed}

@@ -21,8 +21,8 @@ from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.experiments.multi_seed import check_zoo, create_zoo, folders_of, is_zoo
 from mjxgait.plugins.registry import meant
 from mjxgait.tasks.walk.targets import (
-    WISHES,
-    Wishes,
+    TARGETS,
+    WalkTargets,
     configured,
     hint,
 )
@@ -263,7 +263,7 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for name in ("--env", "--config", "--resume", "--use.controller", "--use.task"):
         early.add_argument(name, nargs="?")
-    for name in WISHES:
+    for name in TARGETS:
         early.add_argument(f"--{name}", nargs="?")
     early.add_argument("--scale", nargs="*")
     early.add_argument("--way", nargs="?")
@@ -271,9 +271,9 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
         given, _ = early.parse_known_args(list(arguments))
     except argparse.ArgumentError as error:
         raise UserError(str(error)) from None
-    asked = {name: getattr(given, name) for name in WISHES}
+    requested = {name: getattr(given, name) for name in TARGETS}
     if given.resume:
-        if any(asked.values()):
+        if any(requested.values()):
             raise UserError(
                 f"{given.resume}: a resumed run keeps its settings; other targets need a new run"
             )
@@ -285,7 +285,7 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     file = Path(given.config) if given.config else None
     named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
     use = {kind: name for kind, name in named.items() if name}
-    return creature, configured(creature, file, use, Wishes.of(asked))
+    return creature, configured(creature, file, use, WalkTargets.of(requested))
 
 
 def _settings(options: TrainOptions) -> Config:

@@ -228,5 +228,5 @@ class Config:
     @property
     def wish(self) -> dict[str, float | str]:
         """Walk targets by name; empty for tasks other than walk."""
-        asked = getattr(self.fitness, "wish", None)
-        return asked.table if asked is not None else {}
+        targets = getattr(self.fitness, "wish", None)
+        return targets.table if targets is not None else {}

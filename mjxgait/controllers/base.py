@@ -129,7 +129,7 @@ class RealController(abc.ABC):
         return genome
 
     def load(self, plan: Any) -> jax.Array | None:
-        """See `Controller`: the same for all."""
+        """Equal for all individuals."""
         return None
 
     def init(self) -> Any:
@@ -145,7 +145,7 @@ class RealController(abc.ABC):
         return in_ranges(genomes, self._box(settings))
 
     def numbers(self, genomes: Genes) -> Mapping[str, np.ndarray]:
-        """See `Controller`: none."""
+        """Report no quantities."""
         return {}
 
     def _box(self, settings: object) -> Box:
@@ -169,7 +169,10 @@ class Bodied:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BodiedController:
-    """See `Controller`. sizes: Z. most: largest factor by which a part may grow or shrink."""
+    """Implementation of `Controller`.
+
+    sizes: Z. most: largest factor by which a part may grow or shrink.
+    """
 
     controller: Controller
     sizes: int
@@ -197,7 +200,7 @@ class BodiedController:
         return Box(-end, end)
 
     def variation(self, settings: object, evolution: EvolutionConfig) -> Variation[Bodied]:
-        """See `Controller`: sizes cross gene by gene and mutate like tuning genes."""
+        """Sizes cross gene by gene and mutate like tuning genes."""
         own, box = self.controller.variation(settings, evolution), self.box
         draw = creation(narrowed(box, evolution.initial_spread), evolution)
 

@@ -102,7 +102,7 @@ def sense(
     return {name: SENSES[name](creature, sensed, time) for name in names if name in SENSES}
 
 
-def check_senses(reads: Collection[str], added: Collection[str] = ()) -> None:
+def check_observations(reads: Collection[str], added: Collection[str] = ()) -> None:
     """Refuse names of unknown observations. added: names that a task adds.
 
     Raises:

@@ -20,7 +20,7 @@ from mjxgait.controllers.key_poses.config import DriveConfig
 from mjxgait.creature.body import Body
 from mjxgait.types import BodyState, Plant, Sensed, pytree
 
-Workings = TypeVar("Workings")
+StepData = TypeVar("StepData")
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
@@ -79,11 +79,11 @@ class Drive:
 
     def torque(
         self,
-        plant: Plant[Workings],
+        plant: Plant[StepData],
         rules: Rules,
         body: BodyState,
         sensed: Sensed,
-        workings: Workings,
+        step_data: StepData,
         command: jax.Array,
     ) -> jax.Array:
         """Return joint torques in N·m, [J] per lane, as are rules, states and command."""
@@ -97,7 +97,7 @@ class Drive:
         total = per_lane(plant, lambda f, c, on, bias: self.lift(f) + on * c - bias)(
             force, body.constraint_force, pushed, sensed.bias
         )
-        acceleration = plant.solve_damped(workings, damping, total)
+        acceleration = plant.solve_damped(step_data, damping, total)
         adr = self.creature.joints.dof_adr
         return per_lane(plant, lambda f, a, b: limited_torque(f, a[adr], b, limit))(
             force, acceleration, braked

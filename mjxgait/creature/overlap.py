@@ -17,7 +17,7 @@ import numpy as np
 
 from mjxgait.creature.bars import Bar, bars_of
 from mjxgait.creature.creature import Creature
-from mjxgait.latest import Latest
+from mjxgait.lru import LruCache
 
 NEAR = 0.1
 """Hip heights; joints nearer to each other count as one place, like the three of an Euler hip."""
@@ -99,7 +99,7 @@ def find_crossings(creature: Creature) -> Crossings:
     return _FOUND.find(_search_key(creature), lambda: _search(creature))
 
 
-_FOUND: Latest[Crossings] = Latest(32)
+_FOUND: LruCache[Crossings] = LruCache(32)
 
 
 def _search_key(creature: Creature) -> bytes:

@@ -16,7 +16,7 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.distributed import islands
 from mjxgait.distributed.connect import connected
-from mjxgait.distributed.rows import Blocks
+from mjxgait.distributed.rows import ChunkedEvaluator
 from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.errors import UserError
 from mjxgait.training import loop
@@ -123,7 +123,7 @@ def evolve(
         scheduler = held.enter_context(scheduler_at(cluster, screen.console))
         if several:
             return islands.train(folder, creature, config, screen, scheduler, resume, begin_new)
-        evaluator = Blocks(scheduler, creature, config) if cluster else None
+        evaluator = ChunkedEvaluator(scheduler, creature, config) if cluster else None
         return loop.train(
             folder, creature, config, screen, resume, generation, evaluator, begin_new
         )

@@ -6,7 +6,6 @@ may be lost.
 """
 
 import dataclasses
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -32,10 +31,11 @@ from mjxgait.training.folder import (
     MIGRATIONS,
     MOTHERS,
     Line,
+    append_lines,
     truncate_metrics,
 )
 from mjxgait.training.loop import conclude, interruptible, report, versions
-from mjxgait.training.prescreen import tryout_of
+from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import disk_errors
 
@@ -159,7 +159,7 @@ def train(
         screen.say(experiment.plant_note)
     islands = _Islands(folder, creature, config, resume)
     examiner = Examiner(
-        experiment, versions(), screen.say, Exams(folder / EXAMS), tryout_of(experiment)
+        experiment, versions(), screen.say, Exams(folder / EXAMS), prescreen_of(experiment)
     )
     began, reason, examined = time.perf_counter(), None, None
     screen.say(
@@ -239,8 +239,8 @@ class _Islands:
         rows = list(zip(*([lines[0] for lines in each.lines] for each in found), strict=False))
         lines = [together(row, seconds / len(rows)) for row in rows]
         for place, advanced in zip(self.places, found, strict=True):
-            _append(place / METRICS, [own[0] for own in advanced.lines])
-        _append(self.folder / METRICS, lines)
+            append_lines(place / METRICS, [own[0] for own in advanced.lines])
+        append_lines(self.folder / METRICS, lines)
         self.states = [advanced.packed for advanced in found]
         self.generation = min(advanced.packed.generation for advanced in found)
         for store, advanced in zip(self.stores, found, strict=True):
@@ -268,7 +268,7 @@ class _Islands:
         every = self.settings.every
         if not known or not every or self.generation % every or len(known) == 1:
             return self.states
-        _append(self.folder / MIGRATIONS, self._told(known))
+        append_lines(self.folder / MIGRATIONS, self._told(known))
         return list(exchanged(known, self.settings))
 
     def _told(self, states: list[Packed]) -> Lines:
@@ -295,8 +295,3 @@ class _Islands:
                 truncate_metrics(place / METRICS, generation)
             # The exchange that follows this generation is repeated.
             truncate_metrics(self.folder / MIGRATIONS, generation - 1)
-
-
-def _append(path: Path, lines: Lines) -> None:
-    with disk_errors(path.parent), path.open("a", encoding="utf-8") as log:
-        log.writelines(json.dumps(line) + "\n" for line in lines)

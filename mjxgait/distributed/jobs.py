@@ -17,7 +17,7 @@ from mjxgait.training.checkpoint import Packed, pack
 from mjxgait.training.experiment import Batch, Step
 from mjxgait.training.folder import Line
 from mjxgait.training.loop import followed, metrics_line, versions
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 Lines = list[Line]
 Result_co = TypeVar("Result_co", covariant=True)
@@ -63,7 +63,7 @@ class AdvanceRows(Job[Advanced]):
     @override
     def do(self, programs: Programs, recipe: Recipe) -> Advanced:
         batch = programs.batch(recipe)
-        way = _Way(programs.step(recipe), batch, self._begun(batch), self.until)
+        way = _Generations(programs.step(recipe), batch, self._begun(batch), self.until)
         champions: dict[int, Champion] = {}
         for _ in way:
             for row, experiment in enumerate(batch.experiments):
@@ -87,13 +87,13 @@ class AdvanceIsland(Job[Advanced]):
     island: int
 
     def do(self, programs: Programs, recipe: Recipe) -> Advanced:
-        """See `Job`. The state is packed without the row axis, as in a run's checkpoint."""
+        """The state is packed without the row axis, as in a run's checkpoint."""
         batch = programs.batch(recipe)
         one = batch.experiments[0]
         begun = self.state and self.state.state(one.abstract(), "an island's state")
         state, reason = begun or one.init(self.island), None
         alone = jax.tree.map(lambda leaf: leaf[None], state)
-        way = _Way(programs.step(recipe), batch, alone, self.until)
+        way = _Generations(programs.step(recipe), batch, alone, self.until)
         for lines in way:
             state = jax.tree.map(lambda leaf: leaf[0], way.states)
             lines[0] |= followed(one.simulator.controller.numbers(state.genomes))
@@ -103,7 +103,7 @@ class AdvanceIsland(Job[Advanced]):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Judge(Job[Judged]):
+class Evaluate(Job[Evaluation]):
     """Evaluate genomes [1, N, ...] on starts [1, R], with leaves in NumPy.
 
     asked: see `Evaluator`.
@@ -111,15 +111,17 @@ class Judge(Job[Judged]):
 
     genomes: object
     starts: Starts
-    asked: Asked | None = None
+    requested: RequestedTrials | None = None
 
     @override
-    def do(self, programs: Programs, recipe: Recipe) -> Judged:
-        judged: Judged = programs.judge(recipe, self.genomes, self.starts, self.asked)
-        return judged
+    def do(self, programs: Programs, recipe: Recipe) -> Evaluation:
+        evaluation: Evaluation = programs.evaluate(
+            recipe, self.genomes, self.starts, self.requested
+        )
+        return evaluation
 
 
-class _Way:
+class _Generations:
     """Successive generations of one job and their metrics.
 
     states: of the latest generation.

@@ -43,7 +43,7 @@ class Node:
 
 
 class RayBackend(Backend):
-    """See `Backend`. tell: called with messages for the user.
+    """Implementation of `Backend`. tell: called with messages for the user.
 
     Raises:
       UserError: a machine that is there from the beginning has other versions than this one.
@@ -79,7 +79,7 @@ class RayBackend(Backend):
         return [worker for ref in _ready(self._coming) if (worker := self._begun(ref))]
 
     def start(self, worker: Worker, recipe: Recipe, job: Job) -> None:
-        """See `Backend`. A recipe is sent to each machine once."""
+        """A recipe is sent to each machine once."""
         if recipe.digest not in self._recipes:
             self._recipes[recipe.digest] = ray.put(recipe)
         actor, _ = self._actors[worker]

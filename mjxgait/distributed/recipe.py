@@ -14,18 +14,18 @@ import jax
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
-from mjxgait.latest import Latest
+from mjxgait.lru import LruCache
 from mjxgait.plugins import build_config
 from mjxgait.plugins.user_code import is_loaded, load, loaded
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.blueprint import Plan, draw_up
-from mjxgait.training.experiment import Batch, Shape, Step, build_batch, shape_of
+from mjxgait.training.experiment import Batch, ProgramKey, Step, build_batch, program_key
+from mjxgait.training.spec import SimulatorSpec, make_spec
 from mjxgait.training.stages import CompiledGeneration, Turn, at_once, compiled
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 
 @dataclasses.dataclass(frozen=True)
-class OwnPart:
+class UserCode:
     """A user-defined controller or task: its class, and the file that it is in."""
 
     kind: str
@@ -50,7 +50,7 @@ class Recipe:
 
     files: Mapping[str, str]
     tables: tuple[Mapping[str, object], ...]
-    own: tuple[OwnPart, ...] = ()
+    own: tuple[UserCode, ...] = ()
     sources: tuple[tuple[int, ...], ...] = ()
 
     @classmethod
@@ -60,7 +60,7 @@ class Recipe:
         """Make the recipe of runs of one program."""
         tables = tuple(dataclasses.asdict(config) for config in configs)
         known = tuple(map(tuple, sources))
-        return cls(dict(creature.files), tables, tuple(_own_parts(configs)), known)
+        return cls(dict(creature.files), tables, tuple(_user_code(configs)), known)
 
     @cached_property
     def digest(self) -> str:
@@ -77,14 +77,14 @@ class Recipe:
         return load_files(self.files), configs
 
 
-def _own_parts(configs: Sequence[Config]) -> Iterator[OwnPart]:
+def _user_code(configs: Sequence[Config]) -> Iterator[UserCode]:
     """Yield the loaded plugins that the configs use."""
     used = {name for config in configs for name in (config.use.controller, config.use.task)}
     for kind, text in loaded():
         place, _, cls = text.rpartition(":")
         path = Path(place)
         if f"{path.name}:{cls}" in used:
-            yield OwnPart(kind, cls, path.name, path.read_text(encoding="utf-8"))
+            yield UserCode(kind, cls, path.name, path.read_text(encoding="utf-8"))
 
 
 KEPT = 8
@@ -92,15 +92,15 @@ KEPT = 8
 
 
 @dataclasses.dataclass(frozen=True)
-class BatchShape:
+class BatchKey:
     """Shape of runs side by side. rows: their number. sources: the most that one of them has."""
 
-    run: Shape
+    run: ProgramKey
     rows: int
     sources: int
 
     def name(self, *more: Hashable) -> str:
-        """See `Shape.name`."""
+        """See `ProgramKey.name`."""
         return self.run.name(self.rows, self.sources, *more)
 
 
@@ -109,10 +109,10 @@ class Programs:
 
     def __init__(self, turn: Turn = at_once) -> None:
         self._turn = turn
-        self._batches: Latest[tuple[BatchShape, Batch]] = Latest(KEPT)
-        self._plans: Latest[Plan] = Latest(KEPT)
-        self._stages: Latest[CompiledGeneration] = Latest(KEPT)
-        self._judges: Latest[jax.stages.Compiled] = Latest(KEPT)
+        self._batches: LruCache[tuple[BatchKey, Batch]] = LruCache(KEPT)
+        self._plans: LruCache[SimulatorSpec] = LruCache(KEPT)
+        self._stages: LruCache[CompiledGeneration] = LruCache(KEPT)
+        self._evaluators: LruCache[jax.stages.Compiled] = LruCache(KEPT)
 
     def batch(self, recipe: Recipe) -> Batch:
         """Return the runs of a recipe."""
@@ -127,32 +127,42 @@ class Programs:
 
         return batch.bound(self._stages.find(shape, lambda: batch.stages(turn=turn)))
 
-    def judge(
-        self, recipe: Recipe, genomes: object, starts: Starts, asked: Asked | None = None
-    ) -> Judged:
+    def evaluate(
+        self,
+        recipe: Recipe,
+        genomes: object,
+        starts: Starts,
+        requested: RequestedTrials | None = None,
+    ) -> Evaluation:
         """Evaluate genomes [1, N, ...], in NumPy."""
         shape, batch = self._known(recipe)
         count = jax.tree.leaves(genomes)[0].shape[1]
 
         def compile_it() -> jax.stages.Compiled:
-            program = batch.lower_judge(genomes, starts, asked)
-            with self._turn(shape.name("judge", count)):
+            program = batch.lower_evaluate(genomes, starts, requested)
+            with self._turn(shape.name("evaluate", count)):
                 return compiled(program)
 
-        program = self._judges.find((shape, count), compile_it)
+        program = self._evaluators.find((shape, count), compile_it)
         numbers, rows = batch.known
-        given = (numbers, rows.settings, starts, genomes, *([] if asked is None else [asked]))
-        judged: Judged = jax.device_get(program(*given))
-        return judged
+        given = (
+            numbers,
+            rows.settings,
+            starts,
+            genomes,
+            *([] if requested is None else [requested]),
+        )
+        evaluation: Evaluation = jax.device_get(program(*given))
+        return evaluation
 
-    def _known(self, recipe: Recipe) -> tuple[BatchShape, Batch]:
+    def _known(self, recipe: Recipe) -> tuple[BatchKey, Batch]:
         """Return the runs of a recipe, and the shape of their program."""
         return self._batches.find(recipe.digest, lambda: self._built(recipe))
 
-    def _built(self, recipe: Recipe) -> tuple[BatchShape, Batch]:
+    def _built(self, recipe: Recipe) -> tuple[BatchKey, Batch]:
         creature, configs = recipe.read()
-        shape = shape_of(creature, configs[0])
-        plan = self._plans.find(shape, lambda: draw_up(creature, configs[0]))
+        shape = program_key(creature, configs[0])
+        plan = self._plans.find(shape, lambda: make_spec(creature, configs[0]))
         batch = build_batch(creature, configs, plan, recipe.sources)
         sources = max(map(len, recipe.sources), default=0)
-        return BatchShape(shape, len(configs), sources), batch
+        return BatchKey(shape, len(configs), sources), batch

@@ -1,6 +1,5 @@
 """Whole runs as rows of one program, and one large population in chunks."""
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
@@ -10,15 +9,14 @@ import numpy as np
 
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
-from mjxgait.distributed.jobs import Advanced, AdvanceRows, Judge, Lines
+from mjxgait.distributed.jobs import Advanced, AdvanceRows, Evaluate, Lines
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.checkpoint import Checkpoints, Packed, side_by_side
-from mjxgait.training.folder import METRICS, open_run, truncate_metrics
-from mjxgait.training.stored import disk_errors
-from mjxgait.types import Asked, Judged
+from mjxgait.training.folder import METRICS, append_lines, open_run, truncate_metrics
+from mjxgait.types import Evaluation, RequestedTrials
 
 Tell = Callable[[int, int, Advanced | None], object]
 """Called with the generation, the last generation, and the latest result, if there is one."""
@@ -122,10 +120,7 @@ class Rows:
         state: Packed,
         lines: Lines,
     ) -> None:
-        """Write the log first, since a resumed run can remove its lines, and the state last."""
-        path = folder / METRICS
-        with disk_errors(folder), path.open("a", encoding="utf-8") as log:
-            log.writelines(json.dumps(line) + "\n" for line in lines)
+        append_lines(folder / METRICS, lines)
         stores[folder].keep(state, self.creature.name, self.creature.digest)
 
 
@@ -141,7 +136,7 @@ def _joined(pieces: Sequence[Advanced]) -> Advanced:
     )
 
 
-class Blocks:
+class ChunkedEvaluator:
     """Chunked `Evaluator`: a scheduler evaluates a run's genomes in chunks of equal size.
 
     The size fixes a chunk's bits: they do not depend on the number of machines.
@@ -151,19 +146,23 @@ class Blocks:
     """
 
     def __init__(self, scheduler: Scheduler, creature: Creature, config: Config) -> None:
-        self._crew, self._recipe = scheduler, Recipe.of(creature, [config])
+        self._scheduler, self._recipe = scheduler, Recipe.of(creature, [config])
         self.size = block_size(config.evolution.offspring, config.rollout.block)
 
-    def judge(
-        self, genomes: object, trials: Starts, settings: Config, asked: Asked | None = None
-    ) -> Judged:
-        """See `Evaluator`. Takes one row; its settings are in the recipe."""
-        genomes, trials, asked = jax.device_get((genomes, trials, asked))
-        return together(self._crew.all(self._work(genomes, trials, asked)) or ())
+    def evaluate(
+        self,
+        genomes: object,
+        trials: Starts,
+        settings: Config,
+        requested: RequestedTrials | None = None,
+    ) -> Evaluation:
+        """Takes one row; its settings are in the recipe."""
+        genomes, trials, requested = jax.device_get((genomes, trials, requested))
+        return together(self._scheduler.all(self._work(genomes, trials, requested)) or ())
 
     def _work(
-        self, genomes: object, trials: Starts, asked: Asked | None
-    ) -> Iterator[tuple[Recipe, Judge]]:
+        self, genomes: object, trials: Starts, requested: RequestedTrials | None
+    ) -> Iterator[tuple[Recipe, Evaluate]]:
         count = jax.tree.leaves(genomes)[0].shape[1]
         for first in range(0, count, self.size):
 
@@ -172,8 +171,8 @@ class Blocks:
                 part = slice(first, first + self.size)
                 return leaf[:, part] if leaf.ndim > 1 else leaf * (first == 0)
 
-            block, known = jax.tree.map(cut, (genomes, asked))
-            yield self._recipe, Judge(block, trials, known)
+            block, known = jax.tree.map(cut, (genomes, requested))
+            yield self._recipe, Evaluate(block, trials, known)
 
 
 def block_size(offspring: int, most: int) -> int:
@@ -191,7 +190,7 @@ def block_size(offspring: int, most: int) -> int:
     return size
 
 
-def together(blocks: Sequence[Judged]) -> Judged:
+def together(blocks: Sequence[Evaluation]) -> Evaluation:
     """Join the results of chunks: leaves [B, n, ...] are concatenated, steps [B] are summed."""
 
     def joined(*leaves: np.ndarray) -> np.ndarray:

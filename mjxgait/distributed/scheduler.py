@@ -223,7 +223,7 @@ class Scheduler:
 
 
 class LocalBackend(Backend):
-    """See `Backend`. programs: those that this process has already compiled."""
+    """Implementation of `Backend`. programs: those that this process has already compiled."""
 
     def __init__(self, programs: Programs | None = None) -> None:
         self._programs = programs or Programs()
@@ -240,7 +240,7 @@ class LocalBackend(Backend):
         self._work = worker, recipe, job
 
     def wait(self, seconds: float) -> list[Report]:
-        """See `Backend`. An error of the job is raised unchanged."""
+        """An error of the job is raised unchanged."""
         if self._work is None:
             return []
         (worker, recipe, job), self._work = self._work, None

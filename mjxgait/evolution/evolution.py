@@ -33,7 +33,7 @@ from mjxgait.evolution.state import (
     metrics,
 )
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Judged, Tree
+from mjxgait.types import Evaluation, Tree
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -118,28 +118,30 @@ class Evolution:
         return state.forced if state.stale is None else state.forced & ~state.stale
 
     def promising(
-        self, state: EvolutionState, proposal: Proposal, judged: Judged, share: float
+        self, state: EvolutionState, proposal: Proposal, evaluation: Evaluation, share: float
     ) -> jax.Array:
         """Select the offspring [M] that deserve more trials than the first, evaluated alone so far.
 
         These are the best `share` of all, and the parents that are evaluated once more.
         """
         generation = jnp.maximum(state.generation + 1, 0)
-        worth = self._fitness(proposal.offspring, judged.terms[:, :1], generation)
+        worth = self._fitness(proposal.offspring, evaluation.terms[:, :1], generation)
         place = jnp.argsort(jnp.argsort(-worth))
         best = (place < round(share * len(place))) & jnp.isfinite(worth)
         count, now = self._again(state)
         return best | ((jnp.arange(len(place)) < count) & now & ~self._seeding(state))
 
     def absorb(
-        self, state: EvolutionState, proposal: Proposal, judged: Judged
+        self, state: EvolutionState, proposal: Proposal, evaluation: Evaluation
     ) -> tuple[EvolutionState, GenerationMetrics]:
         """Select the survivors, and decide whether the next generation is forced."""
         seeding = self._seeding(state)
-        recalled, rounds = self._recalled(state, judged)
+        recalled, rounds = self._recalled(state, evaluation)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
-        grown, mothers = self._survive(state, proposal, recalled, judged.terms, rounds, generation)
-        planted = self._plant(state, proposal, judged, generation)
+        grown, mothers = self._survive(
+            state, proposal, recalled, evaluation.terms, rounds, generation
+        )
+        planted = self._plant(state, proposal, evaluation, generation)
         state = jax.tree.map(
             lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
         )
@@ -149,20 +151,22 @@ class Evolution:
         told = None
         if self.config.lineage and mothers is not None:
             told = jnp.where(seeding, NOBODY, mothers)
-        return state, metrics(self.config, state, judged, was_forced, told)
+        return state, metrics(self.config, state, evaluation, was_forced, told)
 
-    def _recalled(self, state: EvolutionState, judged: Judged) -> tuple[Judged, jax.Array | None]:
+    def _recalled(
+        self, state: EvolutionState, evaluation: Evaluation
+    ) -> tuple[Evaluation, jax.Array | None]:
         """Average the terms of parents evaluated once more over all their rounds.
 
         Also return the number of rounds [M].
         """
         if state.rounds is None:
-            return judged, None
+            return evaluation, None
         count = self.config.elites
         rounds = jnp.ones(self.config.offspring).at[:count].add(state.rounds[:count])
         share = (1 / rounds[:count])[:, None, None]
-        mean = share * judged.terms[:count] + (1 - share) * state.terms[:count]
-        return dataclasses.replace(judged, terms=judged.terms.at[:count].set(mean)), rounds
+        mean = share * evaluation.terms[:count] + (1 - share) * state.terms[:count]
+        return dataclasses.replace(evaluation, terms=evaluation.terms.at[:count].set(mean)), rounds
 
     @property
     def _candidates(self) -> jax.Array:
@@ -256,13 +260,17 @@ class Evolution:
         return genomes, jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)), drawn
 
     def _plant(
-        self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array
+        self,
+        state: EvolutionState,
+        proposal: Proposal,
+        evaluation: Evaluation,
+        generation: jax.Array,
     ) -> EvolutionState:
         """Keep the best P of the evaluated candidates, then those not evaluated yet, in order."""
         count = self.config.population
         pool = together(
             (state.genomes, state.terms, state.outcome),
-            (proposal.offspring, judged.terms, judged.outcome),
+            (proposal.offspring, evaluation.terms, evaluation.outcome),
         )
         seeded = jnp.minimum(state.seeded + self.config.offspring, self._candidates)
         places, offspring = jnp.arange(count), jnp.arange(self.config.offspring)
@@ -286,7 +294,7 @@ class Evolution:
         self,
         state: EvolutionState,
         proposal: Proposal,
-        judged: Judged,
+        evaluation: Evaluation,
         verdicts: jax.Array,
         rounds: jax.Array | None,
         generation: jax.Array,
@@ -301,8 +309,8 @@ class Evolution:
             (state.genomes, state.terms, state.outcome, state.born, state.origin, state.rounds),
             (
                 proposal.offspring,
-                judged.terms,
-                judged.outcome,
+                evaluation.terms,
+                evaluation.outcome,
                 proposal.born,
                 proposal.origin,
                 rounds,

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.evolution.variation import first_occurrence
-from mjxgait.types import Judged, pytree
+from mjxgait.types import Evaluation, pytree
 
 NOBODY = -1
 """Mother's place of an individual without a mother, or with an unknown one."""
@@ -137,7 +137,7 @@ def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:
 def metrics(
     config: EvolutionConfig,
     state: EvolutionState,
-    judged: Judged,
+    evaluation: Evaluation,
     forced: jax.Array,
     mothers: jax.Array | None,
 ) -> GenerationMetrics:
@@ -162,11 +162,11 @@ def metrics(
         unique=jnp.sum(first_occurrence(state.genomes)),
         spread=sum(spreads, jnp.zeros(())) / len(spreads),
         forced=forced,
-        failures=jnp.sum(judged.failed),
-        episodes=jnp.sum(judged.failed | jnp.isfinite(judged.terms).all(-1)),
+        failures=jnp.sum(evaluation.failed),
+        episodes=jnp.sum(evaluation.failed | jnp.isfinite(evaluation.terms).all(-1)),
         evaluations=jnp.int32(config.offspring),
-        sim_steps=judged.sim_steps,
-        computed_steps=judged.computed_steps,
+        sim_steps=evaluation.sim_steps,
+        computed_steps=evaluation.computed_steps,
         best_terms=jnp.mean(state.terms[0], axis=0),
         best_outcome=jnp.mean(state.outcome[0], axis=0),
         mothers=mothers,

@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from mjxgait.certification import judged, read_certificate
+from mjxgait.certification import read_certificate, verdict_of
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import STRICT, Whole, build, dump_toml, read_toml
 from mjxgait.creature import Creature
@@ -97,12 +97,12 @@ def create_zoo(
     together: see `Seeds`.
 
     Raises:
-      UserError: see `check_zoo` and `check_plan`; or the folder cannot be written.
+      UserError: see `check_zoo` and `check_spec`; or the folder cannot be written.
     """
-    from mjxgait.training.blueprint import check_plan  # JAX takes a second to import
+    from mjxgait.training.spec import check_spec  # JAX takes a second to import
 
     zoo = check_zoo(zoo, creature, config, runs)
-    check_plan(creature, config)
+    check_spec(creature, config)
     seeds = Seeds(tuple(range(config.seed, config.seed + runs)), together)
     for seed, folder in zip(seeds.seeds, seeds.folders(zoo), strict=True):
         create_run(folder, creature, to_the_last(dataclasses.replace(config, seed=seed)))
@@ -184,5 +184,5 @@ def _found(folder: Path) -> Found:
     document = read_certificate(folder / CERTIFICATE)
     if document is None:
         return Found(folder, False, False, "", None, "not examined")
-    verdict, summary = judged(document), document.get("report", {}).get("summary", "")
+    verdict, summary = verdict_of(document), document.get("report", {}).get("summary", "")
     return Found(folder, True, verdict.certified, summary, verdict.margin, verdict.in_words())

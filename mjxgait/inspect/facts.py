@@ -13,10 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.certification import (
-    judged,
     outdated,
     read_certificate,
     read_stress,
+    verdict_of,
 )
 from mjxgait.certification.describe import in_words
 from mjxgait.certification.validity import StressDocument
@@ -84,7 +84,7 @@ def certificate(snapshot: Snapshot) -> str:
     document = _certificate(snapshot)
     if isinstance(document, str):
         return document
-    found = judged(document)
+    found = verdict_of(document)
     if not found.passed:
         failed = " ".join(map(str, found.numbers))
         told = f"fails criteria {failed}" if failed else "is not certified: there are no criteria"
@@ -130,7 +130,7 @@ def verdict(snapshot: Snapshot) -> Summary | None:
     document = _certificate(snapshot)
     if isinstance(document, str):
         return None
-    report, found = document.get("report", {}), judged(document)
+    report, found = document.get("report", {}), verdict_of(document)
     return {
         "certified": found.certified,
         "failed": found.numbers,

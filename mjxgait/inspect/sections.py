@@ -101,7 +101,7 @@ class PlainView(GenomeView):
         return {"genome_spread": spread}
 
     def difference(self, a: Snapshot, b: Snapshot) -> dict[str, object]:
-        """See `GenomeView`: of the arrays that have the same shape in both."""
+        """Difference of the arrays that have the same shape in both."""
         mine, other = a.genomes, b.genomes
         alike = [n for n in mine if n in other and mine[n].shape[1:] == other[n].shape[1:]]
         return {

@@ -10,7 +10,7 @@ from mjxgait.config.schema import Physics
 from mjxgait.creature import Creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.errors import UserError
-from mjxgait.physics.derived import OtherTopology, sense_layout
+from mjxgait.physics.derived import OtherTopology, observation_layout
 from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
 from mjxgait.physics.lane_major.model import check_supported
 from mjxgait.types import ModelPlant
@@ -33,7 +33,7 @@ def make_plant(
     Raises:
       UserError: MJX does not support something in the model; the message quotes MJX.
     """
-    model, layout = creature.model_where(touch_ends), sense_layout(creature)
+    model, layout = creature.model_where(touch_ends), observation_layout(creature)
     crossings = find_crossings(creature)
     note = ""
     if physics == "auto":
@@ -60,7 +60,7 @@ def parameters_of(
     Raises:
       UserError: the creatures differ in more than numbers.
     """
-    model, layout = creature.model_where(touch_ends), sense_layout(creature)
+    model, layout = creature.model_where(touch_ends), observation_layout(creature)
     try:
         return plant.parameters_of(model, layout, find_crossings(creature))
     except OtherTopology as reason:

@@ -22,7 +22,7 @@ from mjxgait.types import Number, pytree
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class SenseLayout:
+class ObservationLayout:
     """Parts of a model that are sensed.
 
     trunk: body id. qpos_adr, dof_adr: [J] addresses of the actuated joints.
@@ -40,9 +40,9 @@ class OtherTopology(Exception):
     """Error for a body that does not fit a plant; the message says where they differ."""
 
 
-def sense_layout(creature: Creature) -> SenseLayout:
+def observation_layout(creature: Creature) -> ObservationLayout:
     """Layout of a creature."""
-    return SenseLayout(
+    return ObservationLayout(
         creature.trunk,
         creature.joints.qpos_adr,
         creature.joints.dof_adr,

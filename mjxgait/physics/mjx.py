@@ -18,15 +18,15 @@ from mjxgait.creature.ground.surface import (
     height,
 )
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.derived import OtherTopology, SenseLayout, deepest, single
+from mjxgait.physics.derived import ObservationLayout, OtherTopology, deepest, single
 from mjxgait.physics.mjx_parameters import (
     ModelNumbers,
-    heavier,
     mjx,
     model_difference,
     read_numbers,
-    resized,
     reweighed,
+    with_length_scale,
+    with_mass_scale,
 )
 from mjxgait.types import BodyState, Number, Sensed
 
@@ -47,14 +47,14 @@ class MjxPlant:
 
     model: mjx.Model
     data: mjx.Data
-    layout: SenseLayout
+    layout: ObservationLayout
     parameters: ModelNumbers
     crossings: Crossings | None = None
     note: str = ""
     lane_axis: int = 0
 
     def parameters_of(
-        self, model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None = None
+        self, model: mujoco.MjModel, layout: ObservationLayout, crossings: Crossings | None = None
     ) -> ModelNumbers:
         """See `Plant.parameters_of`."""
         device_model = mjx.put_model(model, impl="jax")
@@ -69,31 +69,31 @@ class MjxPlant:
         """See `Plant.with_parameters`."""
         return dataclasses.replace(self, parameters=parameters)
 
-    def heavier(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
-        """See `Plant.heavier`."""
-        return reweighed(self.model, self.data, heavier(parameters, factor))
+    def with_mass_scale(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
+        """See `Plant.with_mass_scale`."""
+        return reweighed(self.model, self.data, with_mass_scale(parameters, factor))
 
-    def resized(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
-        """See `Plant.resized`."""
-        large = resized(self.model, self.layout, self.crossings, parameters, factor)
+    def with_length_scale(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
+        """See `Plant.with_length_scale`."""
+        large = with_length_scale(self.model, self.layout, self.crossings, parameters, factor)
         return reweighed(self.model, self.data, large)
 
     def forward(self, state: BodyState) -> tuple[Sensed, mjx.Data]:
         """See `Plant.forward`."""
         return jax.vmap(self._forward)(state)
 
-    def solve_damped(self, workings: mjx.Data, damping: jax.Array, force: jax.Array) -> jax.Array:
+    def solve_damped(self, step_data: mjx.Data, damping: jax.Array, force: jax.Array) -> jax.Array:
         """See `Plant.solve_damped`."""
 
         def solve(data: mjx.Data, damping: jax.Array, rhs: jax.Array) -> jax.Array:
             mass = mjx.full_m(self.model, data) + jnp.diag(damping)
             return jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(mass), rhs)
 
-        return jax.vmap(solve)(workings, damping, force)
+        return jax.vmap(solve)(step_data, damping, force)
 
-    def advance(self, state: BodyState, workings: mjx.Data, torque: jax.Array) -> BodyState:
+    def advance(self, state: BodyState, step_data: mjx.Data, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
-        return jax.vmap(self._advance)(state, workings, torque)
+        return jax.vmap(self._advance)(state, step_data, torque)
 
     def overlap(self, state: BodyState) -> jax.Array:
         """See `Plant.overlap`."""
@@ -216,10 +216,13 @@ def _cores(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
 
 
 def _sense_difference(
-    own: SenseLayout, other: SenseLayout, pairs: Crossings | None, others: Crossings | None
+    own: ObservationLayout,
+    other: ObservationLayout,
+    pairs: Crossings | None,
+    others: Crossings | None,
 ) -> str:
     """Describe the first difference in what is sensed or watched for overlap; empty if none."""
-    for field in dataclasses.fields(SenseLayout):
+    for field in dataclasses.fields(ObservationLayout):
         if not np.array_equal(getattr(own, field.name), getattr(other, field.name)):
             return f"other parts of it are sensed ({field.name})"
     for name in ("body", "first", "second"):
@@ -231,7 +234,7 @@ def _sense_difference(
 
 def mjx_plant(
     model: mujoco.MjModel,
-    layout: SenseLayout,
+    layout: ObservationLayout,
     crossings: Crossings | None = None,
     note: str = "",
 ) -> MjxPlant:

@@ -14,7 +14,7 @@ from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.derived import (
     Bars,
-    SenseLayout,
+    ObservationLayout,
     inverse_weights,
     read_bars,
     resized_bars,
@@ -77,7 +77,7 @@ class ModelNumbers:
 def read_numbers(
     model: mujoco.MjModel,
     device_model: mjx.Model,
-    layout: SenseLayout,
+    layout: ObservationLayout,
     crossings: Crossings | None,
 ) -> ModelNumbers:
     """Read the numbers of a model; device_model: the same on the device."""
@@ -139,7 +139,7 @@ def _with(numbers: ModelNumbers, **changed: Number) -> ModelNumbers:
     return dataclasses.replace(numbers, model={**numbers.model, **changed})
 
 
-def heavier(numbers: ModelNumbers, factor: Number) -> ModelNumbers:
+def with_mass_scale(numbers: ModelNumbers, factor: Number) -> ModelNumbers:
     """Multiply masses and inertias by factor, [] or [nbody - 1]; nothing else changes yet."""
     bodies = len(numbers.model["body_mass"]) - 1
     every = jnp.concatenate([jnp.ones(1), jnp.broadcast_to(factor, (bodies,))])
@@ -150,9 +150,9 @@ def heavier(numbers: ModelNumbers, factor: Number) -> ModelNumbers:
     )
 
 
-def resized(
+def with_length_scale(
     model: mjx.Model,
-    layout: SenseLayout,
+    layout: ObservationLayout,
     crossings: Crossings | None,
     numbers: ModelNumbers,
     factor: Number,

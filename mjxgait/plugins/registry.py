@@ -47,9 +47,9 @@ def make_controller(body: "Body", step: float, config: Config) -> "Controller":
     """Return the creature's controller. step: s between two control steps."""
     kind = find("controller", config.use.controller)
     added = getattr(find("task", config.use.task), "adds", ())
-    # `told` passes settings and observations to controllers with a genome that depends on them.
-    told = getattr(kind, "told", None)
-    made: Controller = told(body, step, config.controller, added) if told else kind(body, step)
+    # For controllers with a genome that depends on settings and observations.
+    make = getattr(kind, "with_settings", None)
+    made: Controller = make(body, step, config.controller, added) if make else kind(body, step)
     return made
 
 
@@ -57,11 +57,10 @@ def make_task(body: "Body", step: float, ends: "Termination | Ends", config: Con
     """Return the creature's task. ends: the termination conditions."""
     horizon = max(round(config.rollout.seconds / step), 1)
     kind = find("task", config.use.task)
-    # `told` passes the settings to tasks with episode statistics that depend on them.
-    told = getattr(kind, "told", None)
-    made: Task = (
-        told(body, step, horizon, ends, config.fitness) if told else kind(body, step, horizon, ends)
-    )
+    # For tasks with episode statistics that depend on the settings.
+    make = getattr(kind, "with_settings", None)
+    given = (body, step, horizon, ends)
+    made: Task = make(*given, config.fitness) if make else kind(*given)
     return made
 
 

@@ -30,7 +30,7 @@ from mjxgait.reference.controllers import Command, Memory
 
 
 class SameCode:
-    """See `ReferenceController`. The memory's arrays are numbered."""
+    """Implementation of `ReferenceController`. The memory's arrays are numbered."""
 
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
         part: Any = find("controller", champion.controller)
@@ -57,7 +57,10 @@ class SameCode:
         return {str(i): np.repeat(leaf[None], count, axis=0) for i, leaf in enumerate(leaves)}
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
-        """See `ReferenceController`. Padded to a power of two, so that few programs are compiled."""
+        """Command of all individuals.
+
+        Their number is padded to a power of two, so that few programs are compiled.
+        """
         count = len(senses["time"])
         padding = (1 << (count - 1).bit_length()) - count
 
@@ -72,7 +75,7 @@ class SameCode:
         return np.asarray(command, float)[:count], {str(i): leaf for i, leaf in enumerate(kept)}
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `ReferenceController`: NaN, because the controller may have no cycle."""
+        """Return NaN, because the controller may have no cycle."""
         count = len(next(iter(memory.values()))) if memory else 1
         return np.full(count, np.nan)
 
@@ -126,6 +129,7 @@ def load(kind: str, text: str) -> str:
         raise UserError(f"{path}: {name} must inherit from {base.__module__}.{base.__name__}")
     if missing := sorted(getattr(cls, "__abstractmethods__", ())):
         raise UserError(f"{path}: {name} lacks {', '.join(missing)}")
+    _refuse_old_names(path, cls)
     every = getattr(cls, "every", 1)
     try:
         holds(every)
@@ -168,6 +172,28 @@ def _base(kind: str) -> type:
     from mjxgait.tasks.plain import PlainTask
 
     return RealController if kind == "controller" else PlainTask
+
+
+RENAMED = {
+    "aim": "goal",
+    "climbs": "has_curriculum",
+    "harder": "at_level",
+    "judge": "evaluate",
+    "mastered": "level_passed",
+    "onward": "next_goal",
+    "senses": "observations",
+    "standards": "params",
+    "told": "with_settings",
+}
+"""Old and new names of the members of a task or a controller."""
+
+
+def _refuse_old_names(path: Path, cls: type) -> None:
+    """Refuse a class with a member under its old name, which nothing would call."""
+    own = [one for one in cls.__mro__ if not one.__module__.startswith("mjxgait.")]
+    for old, new in RENAMED.items():
+        if any(old in vars(one) for one in own):
+            raise UserError(f"{path}: {cls.__name__}.{old} is now called {new}; rename it")
 
 
 def _module(path: Path, kind: str) -> ModuleType:

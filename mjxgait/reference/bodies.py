@@ -227,11 +227,11 @@ class Bodies:
         moved: np.ndarray = self.subtree_com[rows, self.creature.trunk] - self.start.place
         return moved
 
-    def astray(self, rows: np.ndarray, told: np.ndarray) -> np.ndarray:
+    def astray(self, rows: np.ndarray, commanded: np.ndarray) -> np.ndarray:
         """Return the nose's heading less the commanded one, [rows] rad."""
         rot = self.xmat[rows, self.creature.trunk].reshape(-1, 3, 3)
         nose = rot @ self.creature.frame.forward
-        return wrapped(np.arctan2(nose @ self.start.left, nose @ self.start.forward) - told)
+        return wrapped(np.arctan2(nose @ self.start.left, nose @ self.start.forward) - commanded)
 
     def height(self, rows: np.ndarray) -> np.ndarray:
         """Return the height [rows] in m of the lowest part above the ground."""

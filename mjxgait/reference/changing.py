@@ -44,7 +44,7 @@ class ChangingReference:
         self.step, self.changes, self.seconds = step, changes, seconds
 
     def init(self, count: int) -> Memory:
-        """See `ReferenceController`; `count` must be the number of `changes`."""
+        """Implementation of `ReferenceController`; `count` must be the number of `changes`."""
         assert count == len(self.changes), "a change for each simulation"
         return {
             "cycles": np.zeros(count),
@@ -102,7 +102,7 @@ class HaltingReference(PoseReference):
         self.halts, self.fades = halts, fades
 
     def init(self, count: int) -> Memory:
-        """See `ReferenceController`; `count` must be the number of `halts`."""
+        """Implementation of `ReferenceController`; `count` must be the number of `halts`."""
         assert count == len(self.halts), "a halt for each simulation"
         return {**super().init(count), "halt": self.halts.copy(), "fade": self.fades.copy()}
 
@@ -114,6 +114,6 @@ class HaltingReference(PoseReference):
         halted = planned + share * (self.creature.joints.stand - planned)
         target = self.corrected(halted, senses, memory["steps"])
         steps = memory["steps"] + 1
-        onward = self.advance(memory["position"], target, senses["joint_pos"], steps)
-        position = np.where(since < 0, onward, memory["position"])
+        next_goal = self.advance(memory["position"], target, senses["joint_pos"], steps)
+        position = np.where(since < 0, next_goal, memory["position"])
         return target, {**memory, "position": position, "steps": steps}

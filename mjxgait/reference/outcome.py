@@ -113,11 +113,11 @@ class Outcome:
 
 
 def blank_outcome(
-    count: int, steps: int, film: Trajectory, *, told: bool, middle: bool, low: bool
+    count: int, steps: int, film: Trajectory, *, commanded: bool, middle: bool, low: bool
 ) -> Outcome:
     """Return the results of S simulations before their first step.
 
-    told: whether they follow a commanded heading. middle, low: whether these are recorded.
+    commanded: whether they follow a commanded heading. middle, low: whether these are recorded.
     """
     return Outcome(
         fell=np.full(count, np.inf),
@@ -126,7 +126,7 @@ def blank_outcome(
         aside=np.full((count, steps), np.nan),
         clearance=np.full(count, np.inf),
         trajectory=film,
-        astray=np.full((count, steps if told else 0), np.nan),
+        astray=np.full((count, steps if commanded else 0), np.nan),
         middle=np.full((count, steps if middle else 0, 3), np.nan),
         low=np.full((count, steps if low else 0), np.nan),
     )

@@ -48,7 +48,7 @@ class Around(Protocol):
     grown: bool
     leaps: bool
 
-    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         """See `tasks.AcceptanceCriteria`."""
         ...
 
@@ -97,9 +97,9 @@ class Stepping:
         """
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         film = blank_film(self.creature, time_step, self.record, steps)
-        told = heading is not None
+        commanded = heading is not None
         middle, low = self.task.grown, self.task.leaps
-        seen = blank_outcome(count, steps, film, told=told, middle=middle, low=low)
+        seen = blank_outcome(count, steps, film, commanded=commanded, middle=middle, low=low)
         leader, waiting = self._alike(heading)
         running = np.setdiff1d(np.arange(count), waiting)
         for k in range(steps):
@@ -129,14 +129,14 @@ class Stepping:
         return seen
 
     def _watch(
-        self, seen: Outcome, running: np.ndarray, k: int, told: np.ndarray | None
+        self, seen: Outcome, running: np.ndarray, k: int, commanded: np.ndarray | None
     ) -> np.ndarray:
         """Record the results of a control step; return which of the running [running] are down."""
         bodies, now = self.bodies, (k + 1) * self.creature.model.opt.timestep
         seen.travel[running] = bodies.travel(running)
         seen.path[running, k], seen.aside[running, k] = seen.travel[running, :2].T
-        if told is not None:
-            seen.astray[running, k] = bodies.astray(running, told)
+        if commanded is not None:
+            seen.astray[running, k] = bodies.astray(running, commanded)
         if self.bar is not None:
             clear = self.bar.of(
                 bodies.geom_xpos[running], bodies.geom_xmat[running], self.starts.bar[running]
@@ -194,7 +194,7 @@ class Stepping:
             self.command[running] = self._act(running, state, heading)
         command = self.command[running]
         first, way = self.starts.goal[running], self.bodies.travel(running)[:, 0]
-        self.goal[running] = self.task.onward(self.goal[running], first, way)
+        self.goal[running] = self.task.next_goal(self.goal[running], first, way)
         self.sent[k % len(self.sent), running] = self.drive.torque(
             command, state, starts.stiffness[running], starts.damping[running]
         )

@@ -85,8 +85,8 @@ def moments(walk: Walk) -> np.ndarray:
 def strobe(walk: Walk) -> Image.Image:
     """Draw all moments from the side; the way sets the picture's width."""
     stage, frames = Stage([walk], 2 * HEIGHT, HEIGHT), moments(walk)
-    (entrant,) = stage.entrants
-    shown = [(entrant.painter, *entrant.poses(frame * walk.time_step)) for frame in frames]
+    (participant,) = stage.entrants
+    shown = [(participant.painter, *participant.poses(frame * walk.time_step)) for frame in frames]
     return paint(_camera(stage, walk, frames), shown, stage.origin, stage.relief)
 
 

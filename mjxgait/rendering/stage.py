@@ -16,7 +16,7 @@ from mjxgait.rendering.walk import Walk
 UP = np.array([0.0, 0.0, 1.0])
 
 
-class Entrant:
+class Participant:
     """A participant of a scene, before its shift into a lane.
 
     outline: [points, 3] m, outermost points of the creature at the start. across, along: m, its
@@ -99,7 +99,7 @@ class Stage:
         self.width, self.height, self.time_step = width, height, walks[0].time_step
         self.origin, self.forward = walks[0].trunk_pos[0, :2], walks[0].forward
         self.left = np.array([-self.forward[1], self.forward[0], 0.0])
-        self.entrants = [Entrant(walk, self.origin, self.forward) for walk in walks]
+        self.entrants = [Participant(walk, self.origin, self.forward) for walk in walks]
         self.frames = max(round(walk.seconds / self.time_step) for walk in walks)
         usual = {} if len(walks) == 1 else {"elevation": float(RACE_ELEVATION)}
         self.view = usual if view is None else view_of(view)
@@ -110,14 +110,14 @@ class Stage:
     def alike(self) -> bool:
         """True if all walks have the same creature, goals and bar."""
         first = self.entrants[0].walk
-        return all(_same_scene(first, entrant.walk) for entrant in self.entrants[1:])
+        return all(_same_scene(first, participant.walk) for participant in self.entrants[1:])
 
     def picture(self, frame: int) -> Image.Image:
         """Draw a frame; a finished walk stays in its last pose."""
         shown = []
-        for entrant, lane in zip(self.entrants, self.lanes, strict=True):
-            pos, rot = entrant.poses(frame * self.time_step)
-            shown.append((entrant.painter, pos + lane, rot))
+        for participant, lane in zip(self.entrants, self.lanes, strict=True):
+            pos, rot = participant.poses(frame * self.time_step)
+            shown.append((participant.painter, pos + lane, rot))
         return paint(self.camera(frame), shown, self.origin, self.relief)
 
     def pictures(self, frames: Sequence[int]) -> Iterator[Image.Image]:
@@ -136,17 +136,17 @@ class Stage:
 
     def behind(self, frame: int, place: int) -> np.ndarray:
         """Return the pixel [2] right behind a lane's creature, at half its standing height."""
-        entrant = self.entrants[place]
-        trunk = entrant.trunk(frame * self.time_step) + self.lanes[place]
-        point = trunk[:2] + entrant.back * self.forward
+        participant = self.entrants[place]
+        trunk = participant.trunk(frame * self.time_step) + self.lanes[place]
+        point = trunk[:2] + participant.back * self.forward
         level = float(self.relief(*point)) if self.relief else 0.0
-        middle = trunk[2] if entrant.walk.afloat else 0.5 * entrant.top + level
+        middle = trunk[2] if participant.walk.afloat else 0.5 * participant.top + level
         return self.camera(frame).pixels(np.append(point, middle))
 
     @property
     def relief(self) -> Relief | None:
         """Heights of uneven ground, each lane with its own walk's; None for the plane."""
-        if all(entrant.walk.ground is None for entrant in self.entrants):
+        if all(participant.walk.ground is None for participant in self.entrants):
             return None
         return self._height
 
@@ -156,9 +156,9 @@ class Stage:
         aside = (places - self.origin) @ self.left[:2]
         nearest = np.abs(aside[:, None] - self.lanes @ self.left).argmin(-1)
         heights = np.zeros(len(places))
-        for lane, entrant in enumerate(self.entrants):
+        for lane, participant in enumerate(self.entrants):
             mine = nearest == lane
-            heights[mine] = entrant.ground_heights(places[mine] - self.lanes[lane, :2])
+            heights[mine] = participant.ground_heights(places[mine] - self.lanes[lane, :2])
         return heights.reshape(np.shape(x))
 
     def _lanes(self) -> np.ndarray:
@@ -180,7 +180,7 @@ class Stage:
             float(-seen[:, 1].min() - 0.5 * size[1]) / np.cos(flat.elevation)
             - 0.03 * self.height / self.scale
         )
-        everyone = np.array([self._path(entrant) for entrant in self.entrants])
+        everyone = np.array([self._path(participant) for participant in self.entrants])
         # A race needs room behind the leader.
         behind = 0.0 if len(everyone) == 1 else LAG * self.width / self.scale
         front = np.column_stack(
@@ -188,16 +188,16 @@ class Stage:
         )
         self.way = smooth(front, round(SMOOTH_SECONDS / self.time_step))
 
-    def _path(self, entrant: Entrant) -> np.ndarray:
+    def _path(self, participant: Participant) -> np.ndarray:
         """Path [frames, 3] m: ahead of the start, to its left, and the ground's height there; for a
         swimmer its rise instead.
         """
-        steps = [entrant.frame(frame * self.time_step) for frame in range(self.frames)]
-        trunk = entrant.walk.trunk_pos[steps]
-        places = entrant.placed(trunk)[:, :2]
+        steps = [participant.frame(frame * self.time_step) for frame in range(self.frames)]
+        trunk = participant.walk.trunk_pos[steps]
+        places = participant.placed(trunk)[:, :2]
         moved = places - self.origin
-        afloat = entrant.walk.afloat
-        level = trunk[:, 2] - trunk[0, 2] if afloat else entrant.ground_heights(places)
+        afloat = participant.walk.afloat
+        level = trunk[:, 2] - trunk[0, 2] if afloat else participant.ground_heights(places)
         return np.column_stack([moved @ self.forward, moved @ self.left[:2], level])
 
 

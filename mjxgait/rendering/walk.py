@@ -11,7 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjxgait.certification import judged, outdated, read_certificate
+from mjxgait.certification import outdated, read_certificate, verdict_of
 from mjxgait.certification.acceptance import how_simulated
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
@@ -138,9 +138,9 @@ class Walk:
 
     def _goals(self, first: np.ndarray) -> np.ndarray:
         """All goals [goals] of the walk, m ahead of the start."""
-        goals, onward = list(first[first > 0]), how_simulated(self.champion.task).onward
+        goals, next_goal = list(first[first > 0]), how_simulated(self.champion.task).next_goal
         farthest = ((self.trunk_pos[:, :2] - self.trunk_pos[0, :2]) @ self.forward).max()
-        while len(goals) and (after := onward(goals[-1], goals[0], farthest)) > goals[-1]:
+        while len(goals) and (after := next_goal(goals[-1], goals[0], farthest)) > goals[-1]:
             goals.append(after)
         return np.array(goals)
 
@@ -250,7 +250,7 @@ def doubt(run: Path, walk: Walk) -> str:
         reasons.append(f"it has not been examined, which {command('certify', run, run=run)} does")
     elif old := outdated(document, walk.champion, walk.creature):
         reasons.append(old[0].lower() + old[1:].rstrip("."))
-    elif (verdict := judged(document)).certified:
+    elif (verdict := verdict_of(document)).certified:
         return ""
     elif failed := verdict.failed:
         names = ", ".join(f"{c.number} {c.name}".strip() for c in failed)

@@ -10,17 +10,21 @@ import jax.numpy as jnp
 
 from mjxgait.config.schema import Config
 from mjxgait.simulation.rollout import Episodes, Simulator
-from mjxgait.tasks.base import FINISHED, NONFINITE, Tally, in_order
+from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, in_order
 from mjxgait.tasks.starts import Starts
-from mjxgait.types import Asked, Judged
+from mjxgait.types import Evaluation, RequestedTrials
 
 
 class Evaluator(Protocol):
     """Evaluator of the genomes of several evolution runs, the rows `B`."""
 
-    def judge(
-        self, genomes: object, trials: Starts, settings: Config, asked: Asked | None = None
-    ) -> Judged:
+    def evaluate(
+        self,
+        genomes: object,
+        trials: Starts,
+        settings: Config,
+        requested: RequestedTrials | None = None,
+    ) -> Evaluation:
         """Return the results, leaves [B, N, ...], of genomes [B, N, ...] in the trials [B, R].
 
         settings: traced, leaves [B, ...]. asked: the trials to run; None is all.
@@ -34,54 +38,58 @@ class Local:
 
     simulator: Simulator
 
-    def judge(
-        self, genomes: object, trials: Starts, settings: Config, asked: Asked | None = None
-    ) -> Judged:
-        """See `Evaluator`. Outside the simulations, each row reads only its own data."""
-        wanted = None if asked is None else jnp.asarray(asked.wanted)
+    def evaluate(
+        self,
+        genomes: object,
+        trials: Starts,
+        settings: Config,
+        requested: RequestedTrials | None = None,
+    ) -> Evaluation:
+        """Outside the simulations, each row reads only its own data."""
+        wanted = None if requested is None else jnp.asarray(requested.wanted)
         episodes = self.simulator.simulate(genomes, trials, settings, wanted)
-        lived = jnp.sum(episodes.tally.steps, axis=(1, 2))
+        lived = jnp.sum(episodes.stats.steps, axis=(1, 2))
         # Idle lanes belong to no row: each row is charged in proportion to its own steps.
         share = lived / jnp.maximum(jnp.sum(lived), 1)
         computed = jnp.round(episodes.computed_steps * share).astype(jnp.int32)
 
-        def of_row(row: tuple[Config, Tally, jax.Array]) -> Judged:
-            settings, tally, computed = row
-            return self.verdict(settings, Episodes(tally, computed))
+        def of_row(row: tuple[Config, EpisodeStats, jax.Array]) -> Evaluation:
+            settings, stats, computed = row
+            return self.verdict(settings, Episodes(stats, computed))
 
-        judged = jax.lax.map(of_row, (settings, episodes.tally, computed))
-        return judged if asked is None else completed(judged, asked)
+        evaluation = jax.lax.map(of_row, (settings, episodes.stats, computed))
+        return evaluation if requested is None else completed(evaluation, requested)
 
-    def verdict(self, settings: Config, episodes: Episodes) -> Judged:
+    def verdict(self, settings: Config, episodes: Episodes) -> Evaluation:
         """Return the results of one row's episodes, statistics with leaves [N, R, ...]."""
-        task, tally = self.simulator.task, episodes.tally
+        task, stats = self.simulator.task, episodes.stats
 
         def each(
-            function: Callable[[Tally], Mapping[str, jax.Array]], names: tuple[str, ...]
+            function: Callable[[EpisodeStats], Mapping[str, jax.Array]], names: tuple[str, ...]
         ) -> jax.Array:
-            return jax.vmap(jax.vmap(lambda one: in_order(function(one), names)))(tally)
+            return jax.vmap(jax.vmap(lambda one: in_order(function(one), names)))(stats)
 
-        terms = each(partial(task.judge, settings=settings.fitness), task.terms)
-        return Judged(
-            terms=jnp.where((tally.reason == NONFINITE)[..., None], jnp.nan, terms),
+        terms = each(partial(task.evaluate, settings=settings.fitness), task.terms)
+        return Evaluation(
+            terms=jnp.where((stats.reason == NONFINITE)[..., None], jnp.nan, terms),
             outcome=each(task.outcome, task.outcomes),
-            failed=tally.reason != FINISHED,
-            sim_steps=jnp.sum(tally.steps),
+            failed=stats.reason != FINISHED,
+            sim_steps=jnp.sum(stats.steps),
             computed_steps=episodes.computed_steps,
         )
 
 
-def completed(judged: Judged, asked: Asked) -> Judged:
+def completed(evaluation: Evaluation, requested: RequestedTrials) -> Evaluation:
     """Fill in the known results of the trials that were not run; all leaves [B, ...]."""
 
     def pick(new: jax.Array, known: jax.Array) -> jax.Array:
-        wanted = jnp.asarray(asked.wanted)
+        wanted = jnp.asarray(requested.wanted)
         return jnp.where(wanted.reshape(*wanted.shape, *[1] * (new.ndim - wanted.ndim)), new, known)
 
-    return Judged(
-        terms=pick(judged.terms, asked.known.terms),
-        outcome=pick(judged.outcome, asked.known.outcome),
-        failed=pick(judged.failed, asked.known.failed),
-        sim_steps=judged.sim_steps + asked.known.sim_steps,
-        computed_steps=judged.computed_steps + asked.known.computed_steps,
+    return Evaluation(
+        terms=pick(evaluation.terms, requested.known.terms),
+        outcome=pick(evaluation.outcome, requested.known.outcome),
+        failed=pick(evaluation.failed, requested.known.failed),
+        sim_steps=evaluation.sim_steps + requested.known.sim_steps,
+        computed_steps=evaluation.computed_steps + requested.known.computed_steps,
     )

@@ -21,7 +21,7 @@ from mjxgait.controllers.base import Controller
 from mjxgait.controllers.observations import sense
 from mjxgait.controllers.spd import Drive, Function, Rules, per_lane
 from mjxgait.creature.body import Body
-from mjxgait.tasks.base import FINISHED, NONFINITE, Tally, Task
+from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, Task
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import (
     BodyState,
@@ -40,10 +40,10 @@ AXIS = "lanes"
 class Episodes:
     """All episodes of a generation.
 
-    tally: leaves [B, N, R, ...]. computed_steps: [], those of idle lanes included.
+    stats: leaves [B, N, R, ...]. computed_steps: [], those of idle lanes included.
     """
 
-    tally: Any
+    stats: Any
     computed_steps: jax.Array
 
 
@@ -59,7 +59,7 @@ class Late:
 class Lane:
     """One simulation in flight.
 
-    job: [] place in the device's queue. plan, memory: the controller's. tally, aim, standards: the
+    job: [] place in the device's queue. plan, memory: the controller's. stats, aim, standards: the
     task's. rules: the drive's. push as in `Starts`.
     command: [J] the controller's latest; None where the controller acts in every step.
     late: None where torques are never delayed.
@@ -69,9 +69,9 @@ class Lane:
     body: BodyState
     plan: object
     memory: object
-    tally: Tally
-    aim: object
-    standards: object
+    stats: EpisodeStats
+    goal: object
+    params: object
     rules: Rules
     push: jax.Array
     push_step: jax.Array
@@ -122,7 +122,7 @@ class Simulator:
         jobs = dealt if turns is None else jnp.concatenate([turns, nobody])[dealt]
         if wanted is not None:
             jobs = jnp.where(dealt < jnp.sum(wanted), jobs, total)
-        tally, computed = run(jobs, plans, starts, settings, self._own_starts(genomes, starts))
+        stats, computed = run(jobs, plans, starts, settings, self._own_starts(genomes, starts))
 
         def in_order(leaf: jax.Array) -> jax.Array:
             by_device = leaf.reshape(devices, queue, *leaf.shape[1:])
@@ -130,7 +130,7 @@ class Simulator:
             found = by_turn if turns is None else jnp.zeros_like(by_turn).at[turns].set(by_turn)
             return found.reshape(*shape, *leaf.shape[1:])
 
-        return Episodes(jax.tree.map(in_order, tally), jnp.sum(computed))
+        return Episodes(jax.tree.map(in_order, stats), jnp.sum(computed))
 
     def _turns(
         self, plans: object, shape: tuple[int, ...], wanted: jax.Array | None = None
@@ -162,7 +162,7 @@ class Simulator:
         own: Starts | None,
         *,
         total: int,
-    ) -> tuple[Tally, jax.Array]:
+    ) -> tuple[EpisodeStats, jax.Array]:
         """Run one device's queue of jobs [Q].
 
         Return the statistics, leaves [Q, ...], and the computed steps [1].
@@ -178,23 +178,23 @@ class Simulator:
             )
             return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
 
-        def store(results: Tally, place: jax.Array, tally: Tally) -> Tally:
+        def store(results: EpisodeStats, place: jax.Array, stats: EpisodeStats) -> EpisodeStats:
             return jax.tree.map(
                 lambda rows, leaf: rows.at[place].set(
                     jnp.moveaxis(leaf, self.plant.lane_axis, 0), mode="drop"
                 ),
                 results,
-                tally,
+                stats,
             )
 
         def body(
-            carry: tuple[Lane, Tally, jax.Array, jax.Array],
-        ) -> tuple[Lane, Tally, jax.Array, jax.Array]:
+            carry: tuple[Lane, EpisodeStats, jax.Array, jax.Array],
+        ) -> tuple[Lane, EpisodeStats, jax.Array, jax.Array]:
             lane, results, taken, rounds = carry
             lane = jax.lax.fori_loop(0, CHECK_EVERY, self._step, lane)
             lane = self._look_for_overlap(lane)
-            done = (lane.tally.steps >= self.steps) | (lane.tally.reason != FINISHED)
-            results = store(results, jnp.where(done, lane.job, queue), lane.tally)
+            done = (lane.stats.steps >= self.steps) | (lane.stats.reason != FINISHED)
+            results = store(results, jnp.where(done, lane.job, queue), lane.stats)
             lane = self._per_lane(_choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
             return lane, results, taken + jnp.sum(done), rounds + 1
 
@@ -250,9 +250,9 @@ class Simulator:
             ),
             plan=jax.tree.map(lambda leaf: leaf[row, individual], plans),
             memory=self.controller.init(),
-            tally=self.task.init(),
-            aim=self.task.aim(start),
-            standards=self.task.standards(mine.fitness),
+            stats=self.task.init(),
+            goal=self.task.goal(start),
+            params=self.task.params(mine.fitness),
             rules=self.drive.rules(mine.drive, start.stiffness, start.damping),
             push=start.push,
             push_step=start.push_step,
@@ -273,58 +273,58 @@ class Simulator:
         k: [] steps since lanes took their latest episodes, the same for all lanes.
         """
         body = self._per_lane(_push)(lane)
-        sensed, workings = self.plant.forward(body)
+        sensed, step_data = self.plant.forward(body)
         command, memory = self._command(k, lane, sensed)
-        torque = self.drive.torque(self.plant, lane.rules, body, sensed, workings, command)
+        torque = self.drive.torque(self.plant, lane.rules, body, sensed, step_data, command)
         late = lane.late
         if late is not None:
-            torque, late = self._per_lane(_arriving)(late, lane.tally.steps, torque)
-        tally = self._per_lane(self._judge)(lane, sensed, torque)
-        body = self.plant.advance(body, workings, self._per_lane(self.drive.lift)(torque))
-        aim = self._per_lane(self.task.onward)(lane.aim, sensed)
+            torque, late = self._per_lane(_arriving)(late, lane.stats.steps, torque)
+        stats = self._per_lane(self._evaluate)(lane, sensed, torque)
+        body = self.plant.advance(body, step_data, self._per_lane(self.drive.lift)(torque))
+        goal = self._per_lane(self.task.next_goal)(lane.goal, sensed)
         kept = command if self._holds else None
         return dataclasses.replace(
-            lane, body=body, memory=memory, tally=tally, aim=aim, command=kept, late=late
+            lane, body=body, memory=memory, stats=stats, goal=goal, command=kept, late=late
         )
 
     def _command(self, k: jax.Array, lane: Lane, sensed: Sensed) -> tuple[jax.Array, object]:
         """Return the commands of a step, and the controllers' memories."""
 
-        def asked() -> tuple[jax.Array, object]:
+        def requested() -> tuple[jax.Array, object]:
             return self._per_lane(self._act)(lane, sensed)
 
         if not self._holds:
-            return asked()
+            return requested()
         due = k % self.controller.every == 0
-        return jax.lax.cond(due, asked, lambda: (lane.command, lane.memory))
+        return jax.lax.cond(due, requested, lambda: (lane.command, lane.memory))
 
     def _act(self, lane: Lane, sensed: Sensed) -> tuple[jax.Array, object]:
         """Return the controller's command [J] and its memory."""
-        time, names = lane.tally.steps * self.drive.step, self.controller.reads
+        time, names = lane.stats.steps * self.drive.step, self.controller.reads
         senses = sense(self.creature, sensed, time, names)
-        senses |= self.task.senses(lane.aim, sensed)
+        senses |= self.task.observations(lane.goal, sensed)
         return self.controller.act(lane.plan, lane.memory, senses)
 
     def _look_for_overlap(self, lane: Lane) -> Lane:
         """Record the deepest overlap of parts where an episode is still running."""
-        tally, depth = lane.tally, self.plant.overlap(lane.body)
-        going = (tally.reason == FINISHED) & (tally.steps < self.steps)
+        stats, depth = lane.stats, self.plant.overlap(lane.body)
+        going = (stats.reason == FINISHED) & (stats.steps < self.steps)
         # A comparison, not a maximum: the next step handles a state that is NaN.
-        deeper = jnp.where(going & (depth > tally.overlap), depth, tally.overlap)
-        return dataclasses.replace(lane, tally=dataclasses.replace(tally, overlap=deeper))
+        deeper = jnp.where(going & (depth > stats.overlap), depth, stats.overlap)
+        return dataclasses.replace(lane, stats=dataclasses.replace(stats, overlap=deeper))
 
-    def reason(self, sensed: Sensed, aim: object) -> jax.Array:
+    def reason(self, sensed: Sensed, goal: object) -> jax.Array:
         """Return why [] an episode ends now; `FINISHED` while it goes on."""
-        ended = self.task.ended(sensed, aim)
+        ended = self.task.ended(sensed, goal)
         return jnp.where(_finite(sensed), ended, NONFINITE).astype(jnp.int32)
 
-    def _judge(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> Tally:
+    def _evaluate(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
         """Update the statistics after a step, unless the episode has ended."""
-        tally = lane.tally
-        going = (tally.reason == FINISHED) & (tally.steps < self.steps)
-        reason = self.reason(sensed, lane.aim)
-        updated = self.task.update(tally, sensed, torque, lane.standards, lane.aim)
-        kept = dataclasses.replace(tally, reason=jnp.where(going, reason, tally.reason))
+        stats = lane.stats
+        going = (stats.reason == FINISHED) & (stats.steps < self.steps)
+        reason = self.reason(sensed, lane.goal)
+        updated = self.task.update(stats, sensed, torque, lane.params, lane.goal)
+        kept = dataclasses.replace(stats, reason=jnp.where(going, reason, stats.reason))
         return _choose(going & (reason == FINISHED), updated, kept)
 
     def _per_lane(self, function: Function) -> Function:
@@ -342,7 +342,7 @@ def _choose(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
 
 
 def _push(lane: Lane) -> BodyState:
-    now = lane.tally.steps == lane.push_step
+    now = lane.stats.steps == lane.push_step
     return dataclasses.replace(lane.body, qvel=lane.body.qvel + jnp.where(now, lane.push, 0.0))
 
 

@@ -23,7 +23,7 @@ FINISHED, NONFINITE = 0, -1
 
 
 @pytree
-class Tally:
+class EpisodeStats:
     """Episode statistics common to all tasks; a task's own class adds fields.
 
     steps: [] until the end of the episode.
@@ -36,13 +36,15 @@ class Tally:
     overlap: jax.Array
 
 
+Tally = EpisodeStats
+"""Old name, for users' files."""
 Settings_contra = TypeVar("Settings_contra", contravariant=True)
-Aim = TypeVar("Aim")
-Standards = TypeVar("Standards")
-Stats = TypeVar("Stats", bound=Tally)
+Goal = TypeVar("Goal")
+TaskParams = TypeVar("TaskParams")
+Stats = TypeVar("Stats", bound=EpisodeStats)
 
 
-class Task(Protocol[Settings_contra, Aim, Standards, Stats]):
+class Task(Protocol[Settings_contra, Goal, TaskParams, Stats]):
     """Task of one creature.
 
     Every method but `trials` is for one episode, and is mapped over lanes and episodes.
@@ -68,7 +70,7 @@ class Task(Protocol[Settings_contra, Aim, Standards, Stats]):
         ...
 
     @property
-    def climbs(self) -> bool:
+    def has_curriculum(self) -> bool:
         """Curriculum flag: trials become harder as the best individuals pass them."""
         ...
 
@@ -76,27 +78,27 @@ class Task(Protocol[Settings_contra, Aim, Standards, Stats]):
         """Number [] of times that trials become harder."""
         ...
 
-    def harder(self, trials: Starts, settings: Settings_contra, level: jax.Array) -> Starts:
+    def at_level(self, trials: Starts, settings: Settings_contra, level: jax.Array) -> Starts:
         """Return the trials [R, ...] at this level [] of the curriculum."""
         ...
 
-    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+    def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """Return whether [] these terms, means over an individual's trials, allow harder trials."""
         ...
 
-    def aim(self, trial: Starts) -> Aim:
+    def goal(self, trial: Starts) -> Goal:
         """Data of the trial besides the start: a goal, a light; () if none."""
         ...
 
-    def standards(self, settings: Settings_contra) -> Standards:
+    def params(self, settings: Settings_contra) -> TaskParams:
         """Task parameters that an episode keeps, plain or traced."""
         ...
 
-    def senses(self, aim: Aim, sensed: Sensed) -> Mapping[str, jax.Array]:
+    def observations(self, goal: Goal, sensed: Sensed) -> Mapping[str, jax.Array]:
         """Observations that the task adds, by name."""
         ...
 
-    def onward(self, aim: Aim, sensed: Sensed) -> Aim:
+    def next_goal(self, goal: Goal, sensed: Sensed) -> Goal:
         """Goal from the next step on."""
         ...
 
@@ -104,21 +106,21 @@ class Task(Protocol[Settings_contra, Aim, Standards, Stats]):
         """Return the empty episode statistics."""
         ...
 
-    def ended(self, sensed: Sensed, aim: Aim) -> jax.Array:
+    def ended(self, sensed: Sensed, goal: Goal) -> jax.Array:
         """Reason [] to end the episode now; `FINISHED` continues it."""
         ...
 
     def update(
-        self, tally: Stats, sensed: Sensed, torque: jax.Array, standards: Standards, aim: Aim
+        self, stats: Stats, sensed: Sensed, torque: jax.Array, params: TaskParams, goal: Goal
     ) -> Stats:
         """Return the statistics after one more step under this torque [J] in N·m."""
         ...
 
-    def judge(self, tally: Stats, settings: Settings_contra) -> Mapping[str, jax.Array]:
+    def evaluate(self, stats: Stats, settings: Settings_contra) -> Mapping[str, jax.Array]:
         """Fitness terms [] of an episode by name, each without unit and before its weight."""
         ...
 
-    def outcome(self, tally: Stats) -> Mapping[str, jax.Array]:
+    def outcome(self, stats: Stats) -> Mapping[str, jax.Array]:
         """Metrics by name, in m, s or counts; never a score converted back."""
         ...
 

@@ -13,7 +13,7 @@ from mjxgait.config.tables import NoSettings
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.tasks.base import Tally, why_fallen
+from mjxgait.tasks.base import EpisodeStats, why_fallen
 from mjxgait.tasks.starts import Starts, draw_starts
 from mjxgait.types import Sensed
 
@@ -21,8 +21,8 @@ from mjxgait.types import Sensed
 class PlainTask(abc.ABC):
     """Base class for user-defined tasks (docs/guide/your-own-task.md).
 
-    A subclass needs `counts`, the weight of each fitness term by name, and `judge`. Its own
-    statistics of an episode go into a `Tally` of its own. `Settings` is a frozen dataclass of
+    A subclass needs `counts`, the weight of each fitness term by name, and `evaluate`. Its own
+    statistics of an episode go into a `EpisodeStats` of its own. `Settings` is a frozen dataclass of
     numbers that become keys of `[fitness]`. step: s. horizon: T, steps of a full episode. ends:
     definition of a fall.
     """
@@ -41,11 +41,11 @@ class PlainTask(abc.ABC):
         return tuple(self.counts)
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the first start is nominal, the others are perturbed and pushed."""
+        """The first start is nominal, the others are perturbed and pushed."""
         return draw_starts(key, creature, settings)
 
     @property
-    def climbs(self) -> bool:
+    def has_curriculum(self) -> bool:
         """See `Task`."""
         return False
 
@@ -53,47 +53,45 @@ class PlainTask(abc.ABC):
         """See `Task`."""
         return 0
 
-    def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
-        """See `Task`: always the same."""
+    def at_level(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
+        """Return the trials unchanged."""
         return trials
 
-    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+    def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """See `Task`."""
         return jnp.zeros((), bool)
 
-    def aim(self, trial: Starts) -> object:
+    def goal(self, trial: Starts) -> object:
         """See `Task`."""
         return ()
 
-    def standards(self, settings: Any) -> Any:
+    def params(self, settings: Any) -> Any:
         """See `Task`."""
         return settings
 
-    def senses(self, aim: Any, sensed: Sensed) -> Mapping[str, jax.Array]:
+    def observations(self, goal: Any, sensed: Sensed) -> Mapping[str, jax.Array]:
         """See `Task`."""
         return {}
 
-    def onward(self, aim: Any, sensed: Sensed) -> Any:
-        """See `Task`: the same."""
-        return aim
+    def next_goal(self, goal: Any, sensed: Sensed) -> Any:
+        """Keep the goal."""
+        return goal
 
-    def init(self) -> Tally:
+    def init(self) -> EpisodeStats:
         """See `Task`."""
         none = jnp.zeros((), jnp.int32)
-        return Tally(steps=none, reason=none, overlap=jnp.zeros(()))
+        return EpisodeStats(steps=none, reason=none, overlap=jnp.zeros(()))
 
-    def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
-        """See `Task`: a fall ends the episode."""
+    def ended(self, sensed: Sensed, goal: Any) -> jax.Array:
+        """A fall ends the episode."""
         return why_fallen(self.creature, self.ends, sensed)
 
-    def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
-    ) -> Any:
-        """See `Task`: one more step."""
-        return dataclasses.replace(tally, steps=tally.steps + 1)
+    def update(self, stats: Any, sensed: Sensed, torque: jax.Array, params: Any, goal: Any) -> Any:
+        """Count one more step."""
+        return dataclasses.replace(stats, steps=stats.steps + 1)
 
     @abc.abstractmethod
-    def judge(self, tally: Any, settings: Any) -> Mapping[str, jax.Array]:
+    def evaluate(self, stats: Any, settings: Any) -> Mapping[str, jax.Array]:
         """See `Task`."""
 
     @classmethod
@@ -104,9 +102,9 @@ class PlainTask(abc.ABC):
         """
         return ()
 
-    def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
-        """See `Task`: s until the end."""
-        return {"seconds": tally.steps * self.step}
+    def outcome(self, stats: Any) -> Mapping[str, jax.Array]:
+        """Time in s until the end."""
+        return {"seconds": stats.steps * self.step}
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
         """See `Task`."""

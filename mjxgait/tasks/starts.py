@@ -1,6 +1,7 @@
 """Initial conditions of the trials, shared by all individuals: first nominal, others perturbed."""
 
 import dataclasses
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -33,10 +34,8 @@ class Starts:
       are 1.
     numbers: leaves [R, ...], the body parameters that follow from it, as the plant reads them.
     ground: leaves [R, ...], one per trial; None if all are flat.
-    goal: [R] m ahead of the start; None if the task has none.
-    raised: [R] m by which a bar is above its final height; None without a bar.
-    light: [R, 3] m from where the root starts; None without a light.
-    turn: [R] rad/s, rate of the commanded heading; None without a command.
+    goal: leaves [R, ...], what the task adds to a trial, as its `Task.goal` reads it; None if it
+      adds nothing.
     delay: [R] control steps by which torques are late; None if they never are.
     """
 
@@ -48,12 +47,9 @@ class Starts:
     stiffness: jax.Array
     damping: jax.Array
     ground: Ground | None = None
-    heaviness: jax.Array | None = None
+    mass_scale: jax.Array | None = None
     numbers: object = None
-    goal: jax.Array | None = None
-    raised: jax.Array | None = None
-    light: jax.Array | None = None
-    turn: jax.Array | None = None
+    goal: Any = None
     delay: jax.Array | None = None
 
 
@@ -99,7 +95,7 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),
         stiffness=factors(key_stiffness),
         damping=factors(key_damping),
-        heaviness=_heaviness(jax.random.fold_in(key, 3), creature, config),
+        mass_scale=_mass_scale(jax.random.fold_in(key, 3), creature, config),
         ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
         delay=_delay(jax.random.fold_in(key, 6), config),
     )
@@ -133,7 +129,7 @@ def _delay(key: jax.Array, config: RolloutConfig) -> jax.Array | None:
     return jax.random.randint(key, (config.starts,), 0, config.latency + 1).at[0].set(0)
 
 
-def _heaviness(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:
+def _mass_scale(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:
     if not config.masses:
         return None
     parts = creature.model.nbody - 1

@@ -10,7 +10,7 @@ from typing import cast
 
 from rich.console import Console
 
-from mjxgait.certification import judged, outdated, read_certificate
+from mjxgait.certification import outdated, read_certificate, verdict_of
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -22,7 +22,7 @@ from mjxgait.training.examination import Examiner, Exams, due, why_ended
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.folder import CERTIFICATE, EXAMS, command, kept_champion, open_run
 from mjxgait.training.loop import conclude, versions
-from mjxgait.training.prescreen import tryout_of
+from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.stages import prepare_devices
 from mjxgait.training.stored import Stored, read_stored, stored_generations
@@ -49,7 +49,7 @@ def nothing_left(run: Path, creature: Creature, config: Config, kept: Config) ->
     reason = end_of(run, creature, config, stored)
     if reason is None or not _examined(run, creature, config):
         return None
-    return f"{run}: nothing is left to do: {reason}. {_onward(run, config, stored)}"
+    return f"{run}: nothing is left to do: {reason}. {_next_goal(run, config, stored)}"
 
 
 def _stopped(config: Config, stored: Stored) -> str | None:
@@ -73,7 +73,7 @@ def _certified(run: Path, creature: Creature, config: Config, stored: Stored) ->
             return None
     except UserError:
         return None
-    verdict = judged(document)
+    verdict = verdict_of(document)
     return why_ended(generation, verdict.margin) if verdict.certified else None
 
 
@@ -89,7 +89,7 @@ def _examined(run: Path, creature: Creature, config: Config) -> bool:
     return outdated(document, champion, creature) is None
 
 
-def _onward(run: Path, config: Config, stored: Stored) -> str:
+def _next_goal(run: Path, config: Config, stored: Stored) -> str:
     """Return the command that continues a finished run, or advice if no option does."""
     generation, evolution = stored.manifest.generation, config.evolution
     endless = dataclasses.replace(evolution, target=None, generations=generation + 1)
@@ -150,6 +150,6 @@ def _examine(folder: Path) -> None:
         store.close()
     quiet = Screen(Console(file=io.StringIO()))
     examiner = Examiner(
-        experiment, versions(), quiet.say, Exams(folder / EXAMS), tryout_of(experiment)
+        experiment, versions(), quiet.say, Exams(folder / EXAMS), prescreen_of(experiment)
     )
     conclude(folder, creature, quiet, examiner.best(state))

@@ -17,7 +17,7 @@ from mjxgait.config.tables import STORED, Flag, Index, Text
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.training.experiment import Experiment
 from mjxgait.training.folder import Line, read_records, write_lines
-from mjxgait.training.prescreen import Tryout
+from mjxgait.training.prescreen import Prescreen
 from mjxgait.training.stored import disk_errors
 
 
@@ -124,7 +124,7 @@ class Examiner:
     versions: dict[str, str]
     tell: Callable[[str], None]
     exams: Exams
-    tryout: Tryout | None = None
+    prescreen: Prescreen | None = None
     examines: threading.Event = dataclasses.field(default_factory=threading.Event)
     """Set once a validation has reached the examination, which uses all cores."""
     _margins: dict[str, float] = dataclasses.field(default_factory=dict)
@@ -143,7 +143,7 @@ class Examiner:
         if not due(config.examination, generation):
             return None
         ranks, most = self.experiment.candidates(state), config.examination.on_the_way
-        if self.tryout is None:
+        if self.prescreen is None:
             ranks = ranks[:most]
         likely = [rank for rank in ranks if _promising(self.experiment, state, rank)]
         wanted = enough(config, generation)
@@ -159,11 +159,11 @@ class Examiner:
 
         Without pre-screening their order stays, and every margin is infinite.
         """
-        if self.tryout is None or not ranks:
+        if self.prescreen is None or not ranks:
             return [(rank, np.inf) for rank in ranks]
-        shares = self.tryout.shares(state, ranks)
+        shares = self.prescreen.shares(state, ranks)
         order = np.argsort(-shares, kind="stable")
-        return [(ranks[place], self.tryout.margin(shares[place])) for place in order]
+        return [(ranks[place], self.prescreen.margin(shares[place])) for place in order]
 
     def _on_the_way(self, champion: Champion, generation: int) -> Examined | None:
         """Return a champion with its certificate, if it passes; never validate it twice."""
@@ -307,7 +307,7 @@ class Validation:
         self._state, self._seen = state, Future()
         self._examiner.examines.clear()
         # Two programs that use all devices would block each other, so pre-screening waits here.
-        if self._examiner.tryout is not None:
+        if self._examiner.prescreen is not None:
             self._look(self._seen, state)
             return
         # A daemon thread: a second Ctrl-C does not wait for it.

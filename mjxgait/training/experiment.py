@@ -21,8 +21,8 @@ from mjxgait.plugins.registry import find, what_ends
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.simulation.rollout import Episodes, Simulator
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.blueprint import Numbers, Plan, draw_up
-from mjxgait.training.generation import Row, first_state, judge
+from mjxgait.training.generation import RunParams, evaluate, first_state
+from mjxgait.training.spec import BodyParams, SimulatorSpec, make_spec
 from mjxgait.training.stages import (
     CompiledGeneration,
     Turn,
@@ -34,11 +34,11 @@ from mjxgait.training.stages import (
     lower_stages,
     lowered,
 )
-from mjxgait.types import Asked, Tree
+from mjxgait.types import RequestedTrials, Tree
 
 
 @dataclasses.dataclass(frozen=True)
-class Shape:
+class ProgramKey:
     """Key of a run's compiled programs.
 
     body: digest of the creature. settings: their structure; traced numbers may differ. code: the
@@ -54,10 +54,10 @@ class Shape:
         return hashlib.sha256(repr((self.body, self.settings, *more)).encode()).hexdigest()[:16]
 
 
-def shape_of(creature: Creature, config: Config) -> Shape:
+def program_key(creature: Creature, config: Config) -> ProgramKey:
     """Return the program key of a creature's run under a config."""
     code = (find("controller", config.use.controller), find("task", config.use.task))
-    return Shape(creature.digest, traced_structure(config), code)
+    return ProgramKey(creature.digest, traced_structure(config), code)
 
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
@@ -68,19 +68,19 @@ Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 class Experiment:
     """Pure functions of a run: one creature under one config. The starts follow from the seed.
 
-    creature: as in its files, on the ground of the run. `blueprint.creature` also has the pose
+    creature: as in its files, on the ground of the run. `spec.creature` also has the pose
     ranges of the settings.
     """
 
     creature: Creature
     config: Config
-    blueprint: Plan
-    row: Row
+    spec: SimulatorSpec
+    row: RunParams
 
     @cached_property
     def simulator(self) -> Simulator:
-        """See `Blueprint.own`."""
-        return self.blueprint.own
+        """See `SimulatorSpec.own`."""
+        return self.spec.own
 
     @property
     def starts(self) -> Starts:
@@ -94,27 +94,25 @@ class Experiment:
 
     @property
     def shape(self) -> Hashable:
-        """Key of its compiled programs; see `Shape`."""
-        return shape_of(self.creature, self.config), jax.tree.structure(self.row)
+        """Key of its compiled programs; see `ProgramKey`."""
+        return program_key(self.creature, self.config), jax.tree.structure(self.row)
 
     def init(self, island: int = 0) -> EvolutionState:
         """Return the state of generation -1: a population that is not evaluated yet.
 
         island: each number has its own population, on the same starts; 0 is the run's own.
         """
-        return begin(self.blueprint, *self._origin(island))
+        return begin(self.spec, *self._origin(island))
 
     def abstract(self) -> EvolutionState:
         """Return the shapes and types of a state."""
-        shapes: EvolutionState = jax.eval_shape(
-            partial(first_state, self.blueprint), *self._origin()
-        )
+        shapes: EvolutionState = jax.eval_shape(partial(first_state, self.spec), *self._origin())
         return shapes
 
-    def _origin(self, island: int = 0) -> tuple[Numbers | None, Config, jax.Array]:
+    def _origin(self, island: int = 0) -> tuple[BodyParams | None, Config, jax.Array]:
         """Return the inputs of the first state."""
         key = jax.random.fold_in(key_of(self.config.seed), 0)
-        known = (self.blueprint.numbers, self.row.settings)
+        known = (self.spec.numbers, self.row.settings)
         return *known, jax.random.fold_in(key, island) if island else key
 
     def simulate(self, genomes: object, starts: Starts | None = None) -> Episodes:
@@ -124,15 +122,15 @@ class Experiment:
         """
         rows = _lone((genomes, starts or self.starts, self.row.settings))
         episodes = self.simulator.simulate(*rows)
-        return Episodes(_only(episodes.tally), episodes.computed_steps)
+        return Episodes(_only(episodes.stats), episodes.computed_steps)
 
     def compile(self, evaluator: Evaluator | None = None) -> Step:
         """Compile a generation; `evaluator` evaluates it elsewhere."""
-        return self.step(self.stages(judges=evaluator is None), evaluator)
+        return self.step(self.stages(evaluates=evaluator is None), evaluator)
 
-    def stages(self, judges: bool = True) -> CompiledGeneration:
+    def stages(self, evaluates: bool = True) -> CompiledGeneration:
         """See `Batch.stages`."""
-        return Batch((self,)).stages(judges)
+        return Batch((self,)).stages(evaluates)
 
     def step(self, stages: CompiledGeneration, evaluator: Evaluator | None = None) -> Step:
         """Return the generation with compiled programs of this shape."""
@@ -204,7 +202,7 @@ class Batch:
     experiments: tuple[Experiment, ...]
 
     @cached_property
-    def rows(self) -> Row:
+    def rows(self) -> RunParams:
         """Settings and starts, leaves [B, ...]."""
         return _stack([experiment.row for experiment in self.experiments])
 
@@ -224,40 +222,40 @@ class Batch:
 
         evaluator: evaluates instead of this machine.
         """
-        return self.bound(self.stages(judges=evaluator is None), evaluator)
+        return self.bound(self.stages(evaluates=evaluator is None), evaluator)
 
-    def stages(self, judges: bool = True, turn: Turn = at_once) -> CompiledGeneration:
+    def stages(self, evaluates: bool = True, turn: Turn = at_once) -> CompiledGeneration:
         """See `compile_stages`."""
         first = self.experiments[0]
         settings = first.config.controller, first.config.evolution
         long = first.simulator.controller.variation(*settings).long
-        return compile_stages(self.lower(judges), turn, long)
+        return compile_stages(self.lower(evaluates), turn, long)
 
-    def lower(self, judges: bool = True) -> Iterator[tuple[str, jax.stages.Lowered]]:
+    def lower(self, evaluates: bool = True) -> Iterator[tuple[str, jax.stages.Lowered]]:
         """Lower the programs of a generation, equal for equal shapes; see `lower_stages`."""
-        return lower_stages(self._blueprint, self.rows, self.abstract(), judges)
+        return lower_stages(self._spec, self.rows, self.abstract(), evaluates)
 
     def bound(self, stages: CompiledGeneration, evaluator: Evaluator | None = None) -> Step:
         """Return the generation of these rows with compiled programs of their shape."""
         return partial(stages.step, *self.known, evaluator=evaluator)
 
-    def lower_judge(
-        self, genomes: object, starts: Starts, asked: Asked | None = None
+    def lower_evaluate(
+        self, genomes: object, starts: Starts, requested: RequestedTrials | None = None
     ) -> jax.stages.Lowered:
-        """Lower the program that evaluates genomes [B, N, ...]; see `generation.judge`."""
+        """Lower the program that evaluates genomes [B, N, ...]; see `generation.evaluate`."""
         given = (self.rows.settings, starts, genomes)
-        return lowered(self._blueprint, judge, *given, *([] if asked is None else [asked]))
+        return lowered(self._spec, evaluate, *given, *([] if requested is None else [requested]))
 
     @property
-    def _blueprint(self) -> Plan:
-        return self.experiments[0].blueprint
+    def _spec(self) -> SimulatorSpec:
+        return self.experiments[0].spec
 
     @cached_property
-    def known(self) -> tuple[Numbers | None, Row]:
+    def known(self) -> tuple[BodyParams | None, RunParams]:
         """Body parameters and rows that the programs read, on all devices."""
         one = self.experiments[0]
-        known: tuple[Numbers | None, Row] = jax.device_put(
-            (one.blueprint.numbers, self.rows), everywhere(one.simulator)
+        known: tuple[BodyParams | None, RunParams] = jax.device_put(
+            (one.spec.numbers, self.rows), everywhere(one.simulator)
         )
         return known
 
@@ -272,13 +270,13 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
     Raises:
       UserError: the physics does not support the creature's model.
     """
-    return _experiment(creature, draw_up(creature, config), config)
+    return _experiment(creature, make_spec(creature, config), config)
 
 
 def build_batch(
     creature: Creature,
     configs: Sequence[Config],
-    blueprint: Plan | None = None,
+    spec: SimulatorSpec | None = None,
     sources: Sequence[Sequence[int]] = (),
 ) -> Batch:
     """Build runs of one creature with configs that share one program.
@@ -295,8 +293,8 @@ def build_batch(
         raise UserError(
             "these settings need programs of different shapes: run them in batches of their own"
         )
-    blueprint = blueprint or draw_up(creature, configs[0])
-    experiments = [_experiment(creature, blueprint, config) for config in configs]
+    spec = spec or make_spec(creature, configs[0])
+    experiments = [_experiment(creature, spec, config) for config in configs]
     if any(sources):
         experiments = [
             dataclasses.replace(one, row=dataclasses.replace(one.row, sources=jnp.int32(rows)))
@@ -311,18 +309,18 @@ def _filled_up(sources: Sequence[Sequence[int]]) -> list[list[int]]:
     return [[*rows, *[own] * (most - len(rows))] for own, rows in enumerate(sources)]
 
 
-def _experiment(creature: Creature, blueprint: Plan, config: Config) -> Experiment:
+def _experiment(creature: Creature, spec: SimulatorSpec, config: Config) -> Experiment:
     creature = creature.on(config.rollout.ground)
     key = jax.random.fold_in(key_of(config.seed), 1)
     rollout = config.rollout
     drawn = dataclasses.replace(rollout, starts=1 + (rollout.starts - 1) * rollout.variety)
     # Each run needs its own task: the commands in a trial differ between the rows of a program.
     step, ends = float(creature.model.opt.timestep), what_ends(creature, rollout)
-    task = make_task(blueprint.own.creature, step, ends, config)
+    task = make_task(spec.own.creature, step, ends, config)
     starts = task.trials(key, creature, drawn)
-    if starts.heaviness is not None:
-        starts = embodied(blueprint, starts)
-    return Experiment(creature, config, blueprint, Row(traced(config), starts))
+    if starts.mass_scale is not None:
+        starts = embodied(spec, starts)
+    return Experiment(creature, config, spec, RunParams(traced(config), starts))
 
 
 def _lone(tree: Tree) -> Tree:

@@ -34,6 +34,7 @@ from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, write_text
 from mjxgait.plugins import build_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.user_code import KINDS, places_of
+from mjxgait.training.stored import disk_errors
 
 CONFIG, OWN = "config.toml", "own.toml"
 """Files in a run folder: settings; and FILE.py:CLASS of a user-defined controller or task."""
@@ -261,6 +262,16 @@ def truncate_metrics(path: Path, generation: int) -> None:
     """Remove the lines after a generation, because a resumed run writes them again."""
     kept = [line for line in read_records(path, Numbered) if line["generation"] <= generation]
     write_lines(path, kept)
+
+
+def append_lines(path: Path, lines: Iterable[Mapping[str, object]]) -> None:
+    """Append JSON objects to a log, one per line.
+
+    Logs are written before the checkpoint that they lead to: a kill in between leaves surplus
+    lines, which a resumed run removes (`truncate_metrics`), and never a gap.
+    """
+    with disk_errors(path.parent), path.open("a", encoding="utf-8") as log:
+        log.writelines(json.dumps(line) + "\n" for line in lines)
 
 
 def write_lines(path: Path, lines: Iterable[Mapping[str, object]]) -> None:

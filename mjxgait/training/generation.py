@@ -1,4 +1,4 @@
-"""Parts of a generation of a batch of runs: propose, judge (and promote), absorb.
+"""Parts of a generation of a batch of runs: propose, evaluate (and promote), absorb.
 
 All but the simulations goes row by row, so that a row is independent of the others, unless it
 receives migrants from them.
@@ -25,8 +25,8 @@ from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.base import Task, in_order, score
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.blueprint import Numbers, Plan
-from mjxgait.types import Asked, Judged, pytree
+from mjxgait.training.spec import BodyParams, SimulatorSpec
+from mjxgait.types import Evaluation, RequestedTrials, pytree
 
 LEADERS = 16
 """Number of a row's best individuals that decide on the next curriculum level."""
@@ -35,7 +35,7 @@ SENT = 4
 
 
 @pytree
-class Row:
+class RunParams:
     """Inputs that differ between runs of one compiled program: traced settings and all starts.
 
     sources: [S] rows whose best are evaluated among its children; its own number means no row.
@@ -60,24 +60,24 @@ def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
 
 
 def first_state(
-    blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
+    spec: SimulatorSpec, numbers: BodyParams | None, settings: Config, key: jax.Array
 ) -> EvolutionState:
     """Return the state of a run before the first evaluation."""
-    simulator = blueprint.simulator(numbers)
+    simulator = spec.simulator(numbers)
     task, trials = simulator.task, settings.rollout.starts
     state = evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
-    if not task.climbs:
+    if not task.has_curriculum:
         return state
     return dataclasses.replace(state, level=jnp.int32(0), stale=jnp.zeros((), bool))
 
 
 def propose(
-    blueprint: Plan, numbers: Numbers | None, rows: Row, states: EvolutionState
+    spec: SimulatorSpec, numbers: BodyParams | None, rows: RunParams, states: EvolutionState
 ) -> tuple[Proposal, Starts]:
     """Return the proposals of the rows [B], and the starts [B, R] to evaluate them on."""
-    simulator = blueprint.simulator(numbers)
+    simulator = spec.simulator(numbers)
 
-    def of_row(pair: tuple[Row, EvolutionState]) -> Proposal:
+    def of_row(pair: tuple[RunParams, EvolutionState]) -> Proposal:
         row, state = pair
         return evolution_of(simulator, row.settings).propose(state)
 
@@ -94,8 +94,8 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
     evaluation of the rows.
     """
     count, own = sources.shape[1], jnp.arange(len(sources))[:, None]
-    judged = states.generation[:, None] >= 0
-    comes, rank = (sources != own) & judged, states.generation[:, None] % SENT
+    evaluation = states.generation[:, None] >= 0
+    comes, rank = (sources != own) & evaluation, states.generation[:, None] % SENT
 
     def seated(children: jax.Array, best: jax.Array) -> jax.Array:
         guests, last = best[sources, rank % best.shape[1]], children[:, -count:]
@@ -113,19 +113,19 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
     )
 
 
-def judge(
-    blueprint: Plan,
-    numbers: Numbers | None,
+def evaluate(
+    spec: SimulatorSpec,
+    numbers: BodyParams | None,
     settings: Config,
     starts: Starts,
     genomes: object,
-    asked: Asked | None = None,
-) -> Judged:
+    requested: RequestedTrials | None = None,
+) -> Evaluation:
     """Evaluate genomes [B, N, ...] on this machine."""
-    return Local(blueprint.simulator(numbers)).judge(genomes, starts, settings, asked)
+    return Local(spec.simulator(numbers)).evaluate(genomes, starts, settings, requested)
 
 
-def first_trials(states: EvolutionState, proposals: Proposal) -> Asked:
+def first_trials(states: EvolutionState, proposals: Proposal) -> RequestedTrials:
     """Request the first trial of every individual, with no known results; reads shapes only."""
     shape = (*proposals.born.shape, states.terms.shape[2])
 
@@ -134,51 +134,51 @@ def first_trials(states: EvolutionState, proposals: Proposal) -> Asked:
 
     failed: Any = np.zeros(shape, bool)
     spent: Any = np.zeros(shape[0], np.int32)
-    known = Judged(nothing(states.terms), nothing(states.outcome), failed, spent, spent)
-    return Asked(np.broadcast_to(np.arange(shape[2]) == 0, shape), known)
+    known = Evaluation(nothing(states.terms), nothing(states.outcome), failed, spent, spent)
+    return RequestedTrials(np.broadcast_to(np.arange(shape[2]) == 0, shape), known)
 
 
 def promote(
-    blueprint: Plan,
-    numbers: Numbers | None,
-    rows: Row,
+    spec: SimulatorSpec,
+    numbers: BodyParams | None,
+    rows: RunParams,
     states: EvolutionState,
     proposals: Proposal,
-    judged: Judged,
-) -> Asked:
+    evaluation: Evaluation,
+) -> RequestedTrials:
     """Request the other trials of the best in the first, and of individuals evaluated again."""
-    simulator = blueprint.simulator(numbers)
+    simulator = spec.simulator(numbers)
 
-    def of_row(given: tuple[Row, EvolutionState, Proposal, Judged]) -> jax.Array:
-        row, state, proposal, judged = given
+    def of_row(given: tuple[RunParams, EvolutionState, Proposal, Evaluation]) -> jax.Array:
+        row, state, proposal, evaluation = given
         share = row.settings.rollout.promote
-        return evolution_of(simulator, row.settings).promising(state, proposal, judged, share)
+        return evolution_of(simulator, row.settings).promising(state, proposal, evaluation, share)
 
-    wanted = jax.lax.map(of_row, (rows, states, proposals, judged))
+    wanted = jax.lax.map(of_row, (rows, states, proposals, evaluation))
     others = jnp.arange(states.terms.shape[2]) > 0
-    return Asked(wanted[..., None] & others, judged)
+    return RequestedTrials(wanted[..., None] & others, evaluation)
 
 
 def absorb(
-    blueprint: Plan,
-    numbers: Numbers | None,
-    rows: Row,
+    spec: SimulatorSpec,
+    numbers: BodyParams | None,
+    rows: RunParams,
     states: EvolutionState,
     proposals: Proposal,
-    judged: Judged,
+    evaluation: Evaluation,
 ) -> tuple[EvolutionState, GenerationMetrics]:
     """Complete the generation of the rows after the evaluation."""
-    simulator = blueprint.simulator(numbers)
+    simulator = spec.simulator(numbers)
 
     def of_row(
-        given: tuple[Row, EvolutionState, Proposal, Judged],
+        given: tuple[RunParams, EvolutionState, Proposal, Evaluation],
     ) -> tuple[EvolutionState, GenerationMetrics]:
-        row, state, proposal, judged = given
-        after, told = evolution_of(simulator, row.settings).absorb(state, proposal, judged)
+        row, state, proposal, evaluation = given
+        after, told = evolution_of(simulator, row.settings).absorb(state, proposal, evaluation)
         after = climbed(simulator.task, row.settings.fitness, after)
         return after, dataclasses.replace(told, level=after.level)
 
-    return jax.lax.map(of_row, (rows, states, proposals, judged))
+    return jax.lax.map(of_row, (rows, states, proposals, evaluation))
 
 
 def climbed(task: Task, settings: object, state: EvolutionState) -> EvolutionState:
@@ -191,24 +191,24 @@ def climbed(task: Task, settings: object, state: EvolutionState) -> EvolutionSta
         return state
     best = dict(zip(task.terms, jnp.mean(state.terms[:LEADERS], axis=1).T, strict=True))
     known = (state.generation >= 0) & jnp.isfinite(state.fitness[:LEADERS])
-    ready = jnp.mean(jax.vmap(task.mastered)(best) & known) > 0.5
+    ready = jnp.mean(jax.vmap(task.level_passed)(best) & known) > 0.5
     higher = ready & (state.level < task.levels(settings))
     rounds = None if state.rounds is None else jnp.where(higher, 0.0, state.rounds)
     after = begun_anew(state, higher)
     return dataclasses.replace(after, level=state.level + higher, stale=higher, rounds=rounds)
 
 
-def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:
+def next_starts(task: Task, row: RunParams, state: EvolutionState) -> Starts:
     """Return the starts [R] of the next generation, at its curriculum level."""
     starts = row.starts
     if row.settings.rollout.variety > 1:
         starts = _of_round(row, jnp.maximum(state.generation + 1, 0))
     if state.level is None:
         return starts
-    return task.harder(starts, row.settings.fitness, state.level)
+    return task.at_level(starts, row.settings.fitness, state.level)
 
 
-def _of_round(row: Row, generation: jax.Array) -> Starts:
+def _of_round(row: RunParams, generation: jax.Array) -> Starts:
     """Return the nominal start, and the next of the others in turn."""
     others = row.settings.rollout.starts - 1
     turn = 1 + (generation * others + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)

@@ -22,7 +22,7 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.files import write_text
-from mjxgait.latest import Latest
+from mjxgait.lru import LruCache
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.tasks.base import Task
 from mjxgait.training.checkpoint import Checkpoints
@@ -37,12 +37,13 @@ from mjxgait.training.folder import (
     MOTHERS,
     STRESS,
     Line,
+    append_lines,
     keep_body,
     kept_champion,
     read_metrics,
     truncate_metrics,
 )
-from mjxgait.training.prescreen import tryout_of
+from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.stages import CompiledGeneration
 from mjxgait.training.stored import disk_errors
@@ -83,12 +84,12 @@ def train(
         truncate_metrics(folder / METRICS, begun)
     if experiment.plant_note:
         screen.say(experiment.plant_note)
-    if tryout := tryout_of(experiment):
-        tryout.begin()
+    if prescreen := prescreen_of(experiment):
+        prescreen.begin()
     with screen.compiling(creature.name, experiment):
         step, state = _compiled(experiment, evaluator, restored)
     began = time.perf_counter()
-    examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS), tryout)
+    examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS), prescreen)
     try:
         with interruptible() as interrupted:
             state, reason, examined = _evolve(
@@ -129,13 +130,13 @@ def _compiled(
         return _step(experiment, evaluator), first.result()
 
 
-_COMPILED: Latest[CompiledGeneration] = Latest(2)
+_COMPILED: LruCache[CompiledGeneration] = LruCache(2)
 """Programs of this process's runs, so that the next seed in a notebook is not traced again."""
 
 
 def _step(experiment: Experiment, evaluator: Evaluator | None) -> Step:
-    judges = evaluator is None
-    stages = _COMPILED.find((experiment.shape, judges), lambda: experiment.stages(judges))
+    evaluates = evaluator is None
+    stages = _COMPILED.find((experiment.shape, evaluates), lambda: experiment.stages(evaluates))
     return experiment.step(stages, evaluator)
 
 
@@ -222,9 +223,7 @@ def _generation(
         return state
     line = metrics_line(metrics, time.perf_counter() - began, experiment.simulator.task)
     line |= followed(experiment.simulator.controller.numbers(state.genomes))
-    # The log first: a kill before the checkpoint leaves an extra line, which a resumed run removes.
-    with disk_errors(folder), (folder / METRICS).open("a", encoding="utf-8") as log:
-        log.write(json.dumps(line) + "\n")
+    append_lines(folder / METRICS, [line])
     if np.isfinite(metrics.best):
         with disk_errors(folder):
             write_champion(

@@ -43,7 +43,7 @@ def tried_settings(config: Config) -> Config:
     return dataclasses.replace(config, seed=config.seed + OTHER, rollout=rollout)
 
 
-class Tryout:
+class Prescreen:
     """Pre-screening of one run; its program is compiled at first use or in advance by `begin`."""
 
     def __init__(self, experiment: Experiment) -> None:
@@ -65,9 +65,9 @@ class Tryout:
         padded = np.resize(ranks, self.run.config.examination.candidates)
         genomes = jax.tree.map(lambda leaf: leaf[None, padded], state.genomes)
         numbers, rows = self._batch.known
-        judged = program(numbers, rows.settings, self._starts, genomes)
+        evaluation = program(numbers, rows.settings, self._starts, genomes)
         task, config = self._trials.simulator.task, self._trials.config
-        outcome = np.asarray(judged.outcome)[0, : len(ranks), 1:]
+        outcome = np.asarray(evaluation.outcome)[0, : len(ranks), 1:]
         seconds, creature = config.rollout.seconds, self.run.creature
         managed = [
             self._demands.managed(dict(zip(task.outcomes, one.T, strict=True)), seconds, creature)
@@ -98,8 +98,8 @@ class Tryout:
         """Starts [1, R] of all candidates of the run, at the highest curriculum level."""
         row, task = self._trials.row, self._trials.simulator.task
         starts = row.starts
-        if task.climbs:
-            starts = task.harder(starts, row.settings.fitness, jnp.int32(HARDEST))
+        if task.has_curriculum:
+            starts = task.at_level(starts, row.settings.fitness, jnp.int32(HARDEST))
         return jax.tree.map(lambda leaf: leaf[None], starts)
 
     @cached_property
@@ -113,10 +113,10 @@ class Tryout:
             return jax.ShapeDtypeStruct((1, count, *leaf.shape[1:]), leaf.dtype)
 
         genomes = jax.tree.map(some, self._trials.abstract().genomes)
-        return compiled(self._batch.lower_judge(genomes, self._starts))
+        return compiled(self._batch.lower_evaluate(genomes, self._starts))
 
 
-def tryout_of(experiment: Experiment) -> Tryout | None:
+def prescreen_of(experiment: Experiment) -> Prescreen | None:
     """Return the pre-screening of a run; None if its settings disable it."""
     settings = experiment.config.examination
-    return Tryout(experiment) if settings.tryout and settings.candidates else None
+    return Prescreen(experiment) if settings.tryout and settings.candidates else None

@@ -21,17 +21,17 @@ from mjxgait.processes import cores
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.blueprint import Numbers, Plan
 from mjxgait.training.generation import (
-    Row,
+    RunParams,
     absorb,
+    evaluate,
     first_state,
     first_trials,
-    judge,
     promote,
     propose,
 )
-from mjxgait.types import Asked, Judged
+from mjxgait.training.spec import BodyParams, SimulatorSpec
+from mjxgait.types import Evaluation, RequestedTrials
 
 
 def prepare_devices(devices: int | None = None, kind: str = "") -> None:
@@ -92,77 +92,77 @@ def at_once(name: str) -> AbstractContextManager[object]:
 class CompiledGeneration:
     """Compiled programs of one shape; see `generation`.
 
-    judge: None if another evaluator is used. promote: None if all individuals run all trials.
+    evaluate: None if another evaluator is used. promote: None if all individuals run all trials.
     """
 
     propose: jax.stages.Compiled
     absorb: jax.stages.Compiled
-    judge: jax.stages.Compiled | None = None
+    evaluate: jax.stages.Compiled | None = None
     promote: jax.stages.Compiled | None = None
 
     def step(
         self,
-        numbers: Numbers | None,
-        rows: Row,
+        numbers: BodyParams | None,
+        rows: RunParams,
         states: EvolutionState,
         evaluator: Evaluator | None = None,
     ) -> tuple[EvolutionState, GenerationMetrics]:
         """Run a generation of the rows [B]. evaluator: replaces this machine's program."""
         proposals, starts = self.propose(numbers, rows, states)
 
-        def verdict(*asked: Asked) -> Judged:
+        def verdict(*requested: RequestedTrials) -> Evaluation:
             if evaluator is not None:
-                return evaluator.judge(proposals.offspring, starts, rows.settings, *asked)
-            assert self.judge is not None, "compiled for an evaluator elsewhere"
+                return evaluator.evaluate(proposals.offspring, starts, rows.settings, *requested)
+            assert self.evaluate is not None, "compiled for an evaluator elsewhere"
             given = (numbers, rows.settings, starts, proposals.offspring)
-            found: Judged = self.judge(*given, *asked)
+            found: Evaluation = self.evaluate(*given, *requested)
             return found
 
         if self.promote is None:
-            judged = verdict()
+            evaluation = verdict()
         else:
             first = verdict(first_trials(states, proposals))
-            judged = verdict(self.promote(numbers, rows, states, proposals, first))
+            evaluation = verdict(self.promote(numbers, rows, states, proposals, first))
         after: tuple[EvolutionState, GenerationMetrics] = self.absorb(
-            numbers, rows, states, proposals, judged
+            numbers, rows, states, proposals, evaluation
         )
         return after
 
 
-def lowered(blueprint: Plan, function: Callable[..., object], *given: object) -> jax.stages.Lowered:
+def lowered(
+    spec: SimulatorSpec, function: Callable[..., object], *given: object
+) -> jax.stages.Lowered:
     """Lower a part of a generation for these shapes.
 
     The program is the same for all settings with these shapes, so the compiler's cache has it.
     """
-    placed = everywhere(blueprint.own)
-    program = jax.jit(
-        functools.partial(function, blueprint), in_shardings=placed, out_shardings=placed
-    )
-    return program.lower(blueprint.numbers, *given)
+    placed = everywhere(spec.own)
+    program = jax.jit(functools.partial(function, spec), in_shardings=placed, out_shardings=placed)
+    return program.lower(spec.numbers, *given)
 
 
 def lower_stages(
-    blueprint: Plan, rows: Row, states: EvolutionState, judges: bool = True
+    spec: SimulatorSpec, rows: RunParams, states: EvolutionState, evaluates: bool = True
 ) -> Iterator[tuple[str, jax.stages.Lowered]]:
     """Yield the names and programs for rows and states of these shapes, each traced on demand.
 
-    judges: whether to include the program that evaluates.
+    evaluates: whether to include the program that evaluates.
     """
-    first = lowered(blueprint, propose, rows, states)
+    first = lowered(spec, propose, rows, states)
     yield "propose", first
     proposals, starts = first.out_info
     promotes = rows.settings.rollout.promotes
-    asked = (first_trials(states, proposals),) if promotes else ()
-    given = (rows.settings, starts, proposals.offspring, *asked)
-    if judges:
-        middle = lowered(blueprint, judge, *given)
-        yield "judge", middle
-        judged = middle.out_info
+    requested = (first_trials(states, proposals),) if promotes else ()
+    given = (rows.settings, starts, proposals.offspring, *requested)
+    if evaluates:
+        middle = lowered(spec, evaluate, *given)
+        yield "evaluate", middle
+        evaluation = middle.out_info
     else:
-        judged = jax.eval_shape(functools.partial(judge, blueprint), blueprint.numbers, *given)
+        evaluation = jax.eval_shape(functools.partial(evaluate, spec), spec.numbers, *given)
     if promotes:
-        yield "promote", lowered(blueprint, promote, rows, states, proposals, judged)
-    yield "absorb", lowered(blueprint, absorb, rows, states, proposals, judged)
+        yield "promote", lowered(spec, promote, rows, states, proposals, evaluation)
+    yield "absorb", lowered(spec, absorb, rows, states, proposals, evaluation)
 
 
 def compile_stages(
@@ -173,7 +173,7 @@ def compile_stages(
     long: whether proposing takes long (`Variation`). Crossover of expressions takes half a second
     compiled with "some" effort and three with the least; poses take a hundredth with either.
     """
-    efforts: dict[str, Effort] = {"propose": "some" if long else "least", "judge": "best"}
+    efforts: dict[str, Effort] = {"propose": "some" if long else "least", "evaluate": "best"}
 
     def in_turn(part: str, program: jax.stages.Lowered) -> jax.stages.Compiled:
         with turn(part):
@@ -185,12 +185,12 @@ def compile_stages(
 
 
 def begin(
-    blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
+    spec: SimulatorSpec, numbers: BodyParams | None, settings: Config, key: jax.Array
 ) -> EvolutionState:
-    """See `first_state`. All runs, single or in a batch, share one compiled function: they begin
+    """All runs, single or in a batch, share one compiled function: they begin
     with the same bits.
     """
-    return _beginning()(blueprint, numbers, settings, key)
+    return _beginning()(spec, numbers, settings, key)
 
 
 @functools.cache
@@ -200,6 +200,6 @@ def _beginning() -> Callable[..., EvolutionState]:
     return jax.jit(first_state, static_argnums=0, compiler_options=options)
 
 
-def embodied(blueprint: Plan, starts: Starts) -> Starts:
-    """See `Plan.embodied`. Jitted, or each of its hundreds of operations is compiled alone."""
-    return jax.jit(blueprint.embodied)(starts)
+def embodied(spec: SimulatorSpec, starts: Starts) -> Starts:
+    """Jitted, or each of its hundreds of operations is compiled alone."""
+    return jax.jit(spec.embodied)(starts)

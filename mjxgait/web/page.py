@@ -15,10 +15,10 @@ from mjxgait.animation.export import WalkLoop, build_driven, build_glb, walk_loo
 from mjxgait.certification import (
     Verdict,
     criteria_of,
-    judged,
     outdated,
     read_certificate,
     read_stress,
+    verdict_of,
 )
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -138,7 +138,7 @@ def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:
         for m in c.measures
     ]
     table = _table(("criterion", "measure", "value", "wanted", "verdict"), rows)
-    said = html.escape(_said(judged(document)))
+    said = html.escape(_said(verdict_of(document)))
     return f"<p>{said}</p>{table}{_anywhere(run, champion)}<p>{CHECK}</p>"
 
 

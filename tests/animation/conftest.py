@@ -1,7 +1,7 @@
 """A run of the smallest creature."""
 
 import pytest
-from viewing.made_up import treading, write_run
+from rendering.made_up import treading, write_run
 
 
 @pytest.fixture(scope="session")

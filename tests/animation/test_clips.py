@@ -1,4 +1,4 @@
-"""Several walks in one file, each a stride that begins at the same moment."""
+"""Several walks in one file, each a stride that begins at the same phase."""
 
 import dataclasses
 
@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pygltflib as gltf
 import pytest
-from viewing.made_up import treading
+from rendering.made_up import treading
 
 from mjxgait.animation.export import (
     WalkLoop,
@@ -33,7 +33,7 @@ def stride(walk: Walk) -> WalkLoop:
 
 
 def foot_heights(loop: WalkLoop) -> np.ndarray:
-    """[F] m of the first foot, from MuJoCo alone."""
+    """Heights [F] of the first foot, m, from MuJoCo alone."""
     creature = loop.walk.creature
     data, heights = mujoco.MjData(creature.model), []
     geom = int(creature.feet.watched[0])
@@ -45,7 +45,7 @@ def foot_heights(loop: WalkLoop) -> np.ndarray:
 
 
 def test_a_stride_begins_where_the_first_foot_comes_down(stride: WalkLoop):
-    """Just before it was in the air, at the beginning it is nearly down."""
+    """Just before, the foot is in the air; at the start it is nearly down."""
     heights = foot_heights(stride)
     low, high = heights.min(), heights.max()
     assert stride.strides == 1
@@ -53,7 +53,7 @@ def test_a_stride_begins_where_the_first_foot_comes_down(stride: WalkLoop):
     assert heights[-4] > heights[0]
 
 
-def test_it_is_the_loop_that_begins_elsewhere(walk: Walk, stride: WalkLoop):
+def test_the_stride_is_the_loop_with_another_start(walk: Walk, stride: WalkLoop):
     plain = walk_loop(walk, RATE, most=1)
     assert (stride.qpos[0] == stride.qpos[-1]).all()
     assert stride.advance == plain.advance
@@ -74,7 +74,7 @@ def test_all_animations_of_a_file_move_the_same_joints(stride: WalkLoop):
 
 
 def on_a_circle(walk: Walk, rate: float, speed: float, times: np.ndarray) -> np.ndarray:
-    """The standing pose [F, nq] carried along a circle to the left, the nose along the way."""
+    """The standing pose [F, nq] carried along a circle to the left, facing along it."""
     qpos = np.tile(walk.creature.stand_qpos, (len(times), 1))
     ahead, left = walk.forward, np.array([-walk.forward[1], walk.forward[0]])
     along, aside = np.sin(rate * times) / rate, (1 - np.cos(rate * times)) / rate
@@ -95,7 +95,7 @@ def test_a_circle_is_straightened(walk: Walk):
 
 
 def test_a_travelling_turn_leads_along_a_circle(stride: WalkLoop):
-    """As far along it as it goes, and turned by as much as it turns."""
+    """The root ends at the stride's advance along it, with the stride's turn."""
     turning = dataclasses.replace(stride, advance=0.6, turned=np.radians(30.0))
     document = gltf.GLTF2.load_from_bytes(build_clips({"turn": turning}, travelling=True))
     animation = document.animations[0]

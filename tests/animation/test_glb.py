@@ -1,6 +1,4 @@
-"""The exported animation: the same motion as MuJoCo's, without a seam, and valid for every
-program that reads glTF.
-"""
+"""The exported glTF: the same motion as MuJoCo's, without a seam, valid for every reader."""
 
 import json
 import shutil
@@ -10,7 +8,7 @@ import mujoco
 import numpy as np
 import pygltflib as gltf
 import pytest
-from viewing.made_up import treading
+from rendering.made_up import treading
 
 from mjxgait.animation.export import RATES, build_glb, walk_loop
 from mjxgait.animation.export.skeleton import gltf_axes, resting
@@ -32,7 +30,7 @@ KIND = {
 
 
 ALWAYS = ("crab", "luxo")
-"""One with many legs, and one that has a single one and shapes of its own."""
+"""One with many legs, and one with a single leg and its own shapes."""
 OTHERS = ("alien", "duck", "short_quadruped", "tall_quadruped")
 
 
@@ -65,9 +63,7 @@ def matrix(translation, quat):
 
 
 def node_poses(document, frame=None):
-    """World matrix of each joint of the skin by name, at a key frame or, without one, at rest;
-    from the file alone.
-    """
+    """World matrix of each skin joint by name, at a key frame or at rest, from the file alone."""
     local = [
         (np.array(n.translation or [0, 0, 0]), np.array(n.rotation or [0, 0, 0, 1]))
         for n in document.nodes
@@ -92,7 +88,7 @@ def node_poses(document, frame=None):
 
 
 def body_axes(loop, document):
-    """[3, 3] from each body's axes, which MuJoCo gives, to its bone's, by name."""
+    """Rotation [3, 3] from each body's axes in MuJoCo to its bone's, by name."""
     model, axes = loop.walk.creature.model, gltf_axes(loop.walk.forward)
     data, poses = mujoco.MjData(model), node_poses(document)
     data.qpos[:] = resting(loop)
@@ -144,7 +140,7 @@ def test_the_loop_has_no_seam(loop):
     assert turn < 1.5 * turns + 1e-6
 
 
-def test_in_place_it_stays_above_the_origin_and_travelling_it_leads_forward(stool):
+def test_in_place_stays_at_the_origin_and_travelling_leads_forward(stool):
     loop = walk_loop(record_walk(stool, treading(stool, degrees=15.0), 4.0), 30)
     still, moving = (
         gltf.GLTF2.load_from_bytes(build_glb(loop, travelling)) for travelling in (False, True)
@@ -156,7 +152,7 @@ def test_in_place_it_stays_above_the_origin_and_travelling_it_leads_forward(stoo
 
 
 @pytest.mark.parametrize("rate", RATES)
-def test_frames_lie_on_the_rate_and_the_duration_is_kept(stool, rate):
+def test_frames_follow_the_rate_and_the_duration_is_kept(stool, rate):
     loop = walk_loop(record_walk(stool, treading(stool, period=0.53), 6.0), rate)
     document = gltf.GLTF2.load_from_bytes(build_glb(loop))
     times = read(document, document.animations[0].samplers[0].input)[:, 0]
@@ -171,7 +167,7 @@ def test_up_is_y_and_forward_is_z():
     assert np.linalg.det(axes) == pytest.approx(1.0)
 
 
-def test_one_skin_whose_rest_is_the_standing_pose(loop):
+def test_the_only_skin_rests_in_the_standing_pose(loop):
     document = gltf.GLTF2.load_from_bytes(build_glb(loop))
     assert len(document.skins) == len(document.animations) == len(document.meshes) == 1
     inverse = (
@@ -188,7 +184,7 @@ def test_one_skin_whose_rest_is_the_standing_pose(loop):
 
 
 def test_bones_lie_along_the_limbs_and_turn_about_their_hinges(loop):
-    """Programs draw a bone along its Y axis; who turns it about X turns the part's last hinge."""
+    """Programs draw a bone along its Y axis; a turn about X turns the part's last hinge."""
     document, model = gltf.GLTF2.load_from_bytes(build_glb(loop)), loop.walk.creature.model
     nodes, poses = document.nodes, node_poses(document)
     data, axes = mujoco.MjData(model), gltf_axes(loop.walk.forward)

@@ -1,11 +1,11 @@
-"""The exported USD: what its own library poses is where MuJoCo has it."""
+"""The exported USD: posed by its own library, it matches MuJoCo."""
 
 import sys
 
 import mujoco
 import numpy as np
 import pytest
-from viewing.made_up import treading
+from rendering.made_up import treading
 
 from mjxgait.animation.export import walk_loop
 from mjxgait.animation.export.skeleton import gltf_axes, skeleton_of
@@ -27,7 +27,7 @@ def usd():
 
 @pytest.fixture
 def opened(loop, usd, tmp_path):
-    """The stage, and what poses its skeleton."""
+    """The stage, its skeleton and its skin."""
     from pxr import Usd
 
     export_usd(loop, tmp_path / "walk.usda")
@@ -39,7 +39,7 @@ def opened(loop, usd, tmp_path):
 
 
 def mujoco_places(loop, qpos):
-    """[3] m by body, in the file's axes."""
+    """Position [3] of each body, m, in the file's axes."""
     model = loop.walk.creature.model
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
@@ -73,7 +73,7 @@ def test_the_skin_is_where_the_shapes_are(loop, opened, frame):
         assert np.array(points) == pytest.approx(there.points, abs=1e-4)
 
 
-def test_without_the_extra_it_says_which_to_install(loop, tmp_path, monkeypatch):
+def test_a_missing_extra_is_named(loop, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
     with pytest.raises(UserError, match=r"\[usd\]"):
         export_usd(loop, tmp_path / "walk.usda")

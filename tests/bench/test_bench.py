@@ -1,4 +1,4 @@
-"""The contestants do the same work, and the report says so in the agreed words."""
+"""The benchmark: all peers do the same work, and its reports keep their format."""
 
 import dataclasses
 import importlib.util
@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import STOOL, made_up_judge, pose_champion, said_by, small_config
+from helpers import STOOL, made_up_evaluate, pose_champion, said_by, small_config
 
 import mjxgait.processes
 from mjxgait.bench import c_peer, contest, machine
@@ -72,7 +72,7 @@ def workload(creature):
     )
 
 
-def test_the_law_is_the_examiners(creature, workload):
+def test_the_law_equals_the_reference_controller(creature, workload):
     rng, count = np.random.default_rng(1), 5
     champion = pose_champion(creature, workload.key_poses[1], TUNING)
     turn = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
@@ -104,7 +104,7 @@ def test_the_law_is_the_examiners(creature, workload):
     )
 
 
-def test_the_solve_is_a_solve(creature):
+def test_the_damped_solve_equals_the_dense_solve(creature):
     model = creature.evolution_model
     data = mujoco.MjData(model)
     data.qpos[:] = creature.stand_qpos
@@ -119,13 +119,13 @@ def test_the_solve_is_a_solve(creature):
     np.testing.assert_allclose(found, np.linalg.solve(dense, force), rtol=1e-8)
 
 
-def test_lanes_change_nothing(workload):
+def test_the_number_of_lanes_changes_nothing(workload):
     few, many = MujocoPeer(workload, 0, 1, lanes=2).lap(), MujocoPeer(workload, 0, 1, lanes=6).lap()
     assert few[0] == many[0] == workload.episodes * workload.steps
     assert few[1] == pytest.approx(many[1])
 
 
-def test_the_fallen_make_room(workload):
+def test_fallen_episodes_free_their_lanes(workload):
     low = dataclasses.replace(
         workload, qpos=workload.qpos * np.where(np.arange(workload.qpos.shape[1]) == 2, 0.3, 1.0)
     )
@@ -133,7 +133,7 @@ def test_the_fallen_make_room(workload):
 
 
 @NEEDS_DART
-def test_dart_walks_the_same_way_for_a_while(workload):
+def test_dart_walks_the_same_way_at_first(workload):
     from mjxgait.bench.dart_peer import DartPeer
 
     steps, forward = DartPeer(workload, 0, 1).lap()
@@ -143,7 +143,7 @@ def test_dart_walks_the_same_way_for_a_while(workload):
 
 
 @NEEDS_DART
-def test_dart_says_which_creature_it_cannot_rebuild(creature):
+def test_dart_names_a_creature_that_it_cannot_rebuild(creature):
     from mjxgait.bench.dart_peer import Unsupported, check_supported
 
     check_supported(creature)
@@ -151,16 +151,16 @@ def test_dart_says_which_creature_it_cannot_rebuild(creature):
         check_supported(load_creature(find_creature("duck")))
 
 
-def test_in_a_contest_everybody_is_simulated_on_all_starts(creature):
-    """As the rivals do it; in a run the worse ones are dropped after the first."""
+def test_the_benchmark_simulates_all_individuals_on_all_starts(creature):
+    """The peers do the same; a run drops the worse individuals after the first start."""
     settings = creature.settings
     assert resolve_config(settings.train, creature.name).rollout.promote < 1
     assert walking(settings).rollout.promote == 1
 
 
 @pytest.mark.parametrize("generation", [-1, 2])
-def test_the_rivals_have_the_starts_that_a_lap_judges(stool, generation):
-    """Where starts vary a run has many more than a generation takes."""
+def test_the_peers_have_the_starts_of_a_lap(stool, generation):
+    """With varied starts a run has many more than a generation uses."""
     config = small_config(
         rollout={"starts": 3, "variety": 5}, evolution={"survival": "children", "elite": 0.25}
     )
@@ -168,10 +168,10 @@ def test_the_rivals_have_the_starts_that_a_lap_judges(stool, generation):
     assert len(experiment.starts.friction) == 11
     state = dataclasses.replace(experiment.init(), generation=jnp.int32(generation))
     work = as_workload(STOOL, experiment, state)
-    judged = next_starts(experiment.simulator.task, experiment.row, state)
+    evaluation = next_starts(experiment.simulator.task, experiment.row, state)
     assert work.episodes == len(work.key_poses) * 3
     for name in ("qpos", "qvel", "friction", "push", "push_step"):
-        np.testing.assert_array_equal(getattr(work, name), np.asarray(getattr(judged, name)))
+        np.testing.assert_array_equal(getattr(work, name), np.asarray(getattr(evaluation, name)))
     later = 1 + 2 * (generation + 1)
     np.testing.assert_array_equal(work.qpos[1:], experiment.starts.qpos[later : later + 2])
 
@@ -247,7 +247,7 @@ def test_history_has_a_line_per_run(tmp_path):
 
 
 def made_up_result(folder, options):
-    """What a contest would have found out, without one."""
+    """Result of a contest, without running one."""
     costs = {"ours": {"median": 3.0}, "c": {"median": 9.0}}
     return {
         "creature": folder.name,
@@ -277,7 +277,7 @@ def test_the_command_measures_several_creatures(tmp_path, monkeypatch, capsys):
     assert [line.split()[0] for line in said.splitlines()[-3:-1]] == ["duck", "alien"]
 
 
-def test_all_means_every_shipped_creature_that_does_not_grow(tmp_path, monkeypatch):
+def test_all_means_every_shipped_creature_except_modular_ones(tmp_path, monkeypatch):
     monkeypatch.setattr(bench, "_measured", made_up_result)
     bench.bench_command(["--json", str(tmp_path / "bench.json"), "--env", "all"])
     found = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))
@@ -285,26 +285,26 @@ def test_all_means_every_shipped_creature_that_does_not_grow(tmp_path, monkeypat
     assert list(found["ratios"]) == sorted(shipped - {"blocks"})
 
 
-def test_one_creature_is_written_as_it_is(tmp_path, monkeypatch):
+def test_the_result_of_one_creature_is_written_unchanged(tmp_path, monkeypatch):
     monkeypatch.setattr(bench, "_measured", made_up_result)
     bench.bench_command(["--json", str(tmp_path / "bench.json")])
     found = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))
     assert found == made_up_result(find_creature("tall_quadruped"), None)
 
 
-def test_the_curves_are_of_one_creature(tmp_path):
+def test_the_curves_need_a_single_creature(tmp_path):
     with pytest.raises(UserError, match="--scaling measures one creature"):
         bench.bench_command(["--json", str(tmp_path / "b.json"), "--env", "all", "--scaling"])
 
 
 MADE_UP_COST = {"flops_asked": 2.0, "flops": 3.0, "bytes": 5.0, "state_bytes": 1.0}
-"""A cost per step; to know the true one the step is compiled once more."""
+"""Cost per step; the true cost needs another compilation of the step."""
 
 
 @pytest.fixture
 def unsimulated(monkeypatch):
-    """We simulate nothing, so that only evolution is compiled; the rivals run on one core."""
-    monkeypatch.setattr(stages, "judge", made_up_judge)
+    """No simulation, so that only evolution is compiled; the peers run on one core."""
+    monkeypatch.setattr(stages, "evaluate", made_up_evaluate)
     monkeypatch.setattr(contest, "step_cost", lambda experiment: MADE_UP_COST)
     for module in (contest, machine, c_peer, mjxgait.processes):
         monkeypatch.setattr(module, "cores", lambda: 1)
@@ -318,7 +318,7 @@ SIMULATED = pytest.mark.thorough("compiles the whole; each part has tests of its
     "simulated", [False, pytest.param(True, marks=SIMULATED)], ids=["made up", "simulated"]
 )
 def test_the_command_writes_the_ratios(tmp_path, capsys, request, simulated):
-    """On a body whose starts vary by generation, as those of the shipped ones do."""
+    """The starts vary by generation, as for the shipped bodies."""
     if not simulated:
         request.getfixturevalue("unsimulated")
     file, body = tmp_path / "bench.json", tmp_path / "body"
@@ -337,6 +337,6 @@ def test_the_command_writes_the_ratios(tmp_path, capsys, request, simulated):
     ours, theirs = (found["laps"][name][0]["steps"] for name in ("ours", "mujoco_c"))
     if simulated:
         assert ours == pytest.approx(theirs, rel=0.1)
-    else:  # a step of each episode, and all of the rivals'
+    else:  # one step of each episode, all steps of the peers
         assert 0 < ours < theirs
     assert (found["ratio_over_dart"] is None) == ("dart" in found["left_out"])

@@ -1,4 +1,4 @@
-"""The rival in C lives the same episodes as the one in NumPy, which shares none of its code."""
+"""The C peer runs the same episodes as the NumPy peer, which shares none of its code."""
 
 import dataclasses
 import shutil
@@ -39,7 +39,7 @@ def library(tmp_path_factory):
 
 
 def made_up(name: str) -> Workload:
-    """Poses drawn so wide that some fall; the second start is slippery and pushed."""
+    """Poses that vary so much that some fall; the second start is slippery and pushed."""
     folder, rng, genomes, starts = find_creature(name), np.random.default_rng(0), 6, 2
     creature = load_creature(folder)
     qpos = np.tile(creature.stand_qpos, (starts, 1))
@@ -67,7 +67,7 @@ def walks():
 
 
 @pytest.mark.parametrize("name", ["tall_quadruped", "duck", "alien"])
-def test_it_lives_the_same_episodes(name, library):
+def test_the_episodes_equal_those_of_the_numpy_peer(name, library):
     work = made_up(name)
     steps, forward = CPeer(work, 0, 1, library).lap()
     expected_steps, expected_forward = MujocoPeer(work, 0, 1).lap()
@@ -75,7 +75,7 @@ def test_it_lives_the_same_episodes(name, library):
     assert forward == pytest.approx(expected_forward, rel=1e-3)
 
 
-def test_the_clock_moves_it_the_same_way(walks, library):
+def test_the_clock_gives_the_same_episodes(walks, library):
     law = dataclasses.replace(walks.config.controller, advance="clock")
     work = dataclasses.replace(walks, config=dataclasses.replace(walks.config, controller=law))
     found, expected = CPeer(work, 0, 1, library).lap(), MujocoPeer(work, 0, 1).lap()
@@ -100,7 +100,7 @@ def test_shares_add_up_and_laps_repeat(walks, library):
     assert np.sum([share.lap() for share in shares], axis=0) == pytest.approx(first)
 
 
-def test_the_bare_model_moves_as_the_whole_one(shipped):
+def test_the_bare_model_moves_like_the_whole_model(shipped):
     whole, (bare, watched) = shipped.evolution_model, bare_model(shipped)
     assert bare.ngeom < whole.ngeom
     assert bare.npair
@@ -114,7 +114,7 @@ def test_the_bare_model_moves_as_the_whole_one(shipped):
 
 
 def dropped(model, geoms, creature):
-    """Where a creature without torques is after a while, and with how many contacts."""
+    """Pose, contacts and places of geoms after 60 steps without torques."""
     data = mujoco.MjData(model)
     data.qpos[:] = creature.stand_qpos
     data.qvel[:2] = 0.5
@@ -123,7 +123,7 @@ def dropped(model, geoms, creature):
     return data.qpos.copy(), data.ncon, data.geom_xpos[geoms].copy()
 
 
-def test_a_model_whose_parts_touch_each_other_stays_whole(stool):
+def test_a_model_with_colliding_parts_stays_whole(stool):
     text = stool.files["creature.xml"].replace('conaffinity="2"', 'conaffinity="3"')
     model = mujoco.MjModel.from_xml_string(text)
     settings = dataclasses.replace(
@@ -134,7 +134,7 @@ def test_a_model_whose_parts_touch_each_other_stays_whole(stool):
     assert watched is stool.feet.watched
 
 
-def test_without_a_compiler_the_reason_is_said(walks, monkeypatch):
+def test_without_a_compiler_the_reason_is_given(walks, monkeypatch):
     monkeypatch.setattr(c_peer.shutil, "which", lambda name: None)
     monkeypatch.setattr(contest, "Workers", lambda *_, **__: "worker")
     peers, left_out = contest._peers(walks)

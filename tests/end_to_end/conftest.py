@@ -1,4 +1,4 @@
-"""Runs in seconds what takes minutes: short examinations, and no process but this one."""
+"""Fixtures that shorten minutes to seconds: short examinations, all in this process."""
 
 import concurrent.futures
 import contextlib
@@ -27,18 +27,18 @@ from mjxgait.distributed.recipe import Programs
 from mjxgait.distributed.scheduler import LocalBackend
 from mjxgait.experiments.ablation import findings, rows
 from mjxgait.training import loop
-from mjxgait.training.prescreen import Tryout
+from mjxgait.training.prescreen import Prescreen
 
 CERTIFICATE = CertificateConfig.__init__
 PROGRAMS = Programs()
-"""Of all studies and sets of runs: those of the same shape share one."""
+"""Programs of all studies and multi-seed runs; runs of the same shape share one."""
 
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The code of an examination is as shipped; its defaults are few starts and short times.
+    """Examine with the shipped code, but few initial conditions and short times by default.
 
-    So are those of the report of a study: few resamples.
+    Study reports use few resamples.
     """
     _default(monkeypatch, CertificateConfig, build(CertificateConfig, SHORTER, "short"))
     _default(monkeypatch, StressConfig, StressConfig(starts=4, seconds=1.0, long=2.0))
@@ -53,13 +53,13 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 @pytest.fixture(autouse=True)
 def sketched(request: pytest.FixtureRequest) -> Iterator[pytest.MonkeyPatch]:
-    """Let generations pass without a simulation, unless `--thorough` is given."""
+    """Skip the simulation of generations, unless `--thorough` is given."""
     with pytest.MonkeyPatch.context() as patch:
         if not request.config.getoption("--thorough"):
             patch.setattr(loop, "_compiled", unevolved)
             patch.setattr(board, "LocalBackend", partial(Unevolved, PROGRAMS))
-            patch.setattr(Tryout, "begin", lambda tryout: None)
-            patch.setattr(Tryout, "_program", property(untried))
+            patch.setattr(Prescreen, "begin", lambda prescreen: None)
+            patch.setattr(Prescreen, "_program", property(untried))
             patch.setattr(overlap, "SAMPLES", 16)
         yield patch
 
@@ -78,7 +78,7 @@ def examined_in_full(short: None, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _default(monkeypatch: pytest.MonkeyPatch, cls: type, short: Any) -> None:
-    """Give a class of settings other defaults."""
+    """Change the defaults of a settings class."""
     plain = cls.__init__
     given = {field.name: getattr(short, field.name) for field in dataclasses.fields(cls)}
     monkeypatch.setattr(cls, "__init__", lambda self, **own: plain(self, **given | own))
@@ -88,13 +88,13 @@ def _default(monkeypatch: pytest.MonkeyPatch, cls: type, short: Any) -> None:
 def _one_thread(
     most: int | None = None, prepare: Callable[[], object] | None = None
 ) -> Iterator[concurrent.futures.Executor]:
-    """Stand in for `process_per_core`: new processes would know nothing of short examinations."""
+    """Stand in for `process_per_core`: new processes would run full examinations."""
     with concurrent.futures.ThreadPoolExecutor(1) as pool:
         yield pool
 
 
 def said_by_python(arguments: Sequence[str]) -> tuple[int, str]:
-    """Run `python ARGUMENTS` in this process; return the exit code and what it printed."""
+    """Run `python ARGUMENTS` in this process; return the exit code and the output."""
     said, old = io.StringIO(), (sys.argv, list(sys.path))
     siblings = {path.stem for path in Path(arguments[0]).parent.glob("*.py")}
     hidden = {name: sys.modules.pop(name) for name in siblings & sys.modules.keys()}
@@ -117,14 +117,14 @@ def said_by_python(arguments: Sequence[str]) -> tuple[int, str]:
 
 
 def _is_ours(command: Any) -> bool:
-    """Tell whether a process would run this program or a file of Python."""
+    """Return whether a command runs this program or a Python file."""
     if isinstance(command, str) or str(command[0]) != sys.executable:
         return False
     return list(command[1:4]) == ["-P", "-m", "mjxgait"] or str(command[1]).endswith(".py")
 
 
 def _run_here(run: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `subprocess.run` that stays in this process where it would start this Python."""
+    """Wrap `subprocess.run`: commands of this Python run in this process."""
 
     def here(command: Any, **options: Any) -> Any:
         if not _is_ours(command):

@@ -1,7 +1,7 @@
-"""What the program ships, and every way of training that it names; read from the files and the registries.
+"""Everything that is shipped and every way to train it, read from the files and the registries.
 
-A new creature, task, configuration, style, study, subcommand, benchmark or script is in the net by
-itself: it is found here, and it fails there until it ends as it should.
+A new creature, task, configuration, style, study, subcommand, benchmark or script is found here
+automatically; its end-to-end test fails until it works.
 """
 
 import dataclasses
@@ -25,7 +25,7 @@ from mjxgait.tasks.plain import PlainTask
 ROOT = Path(__file__).parents[2]
 CREATURES, CONFIGS = shipped_creatures(), shipped_configs()
 TASKS = [name for name, kind in tasks().items() if not kind.called]
-"""By the names that a user gives them."""
+"""Task names as a user types them."""
 SMALLEST_WALKER = "short_quadruped"
 STYLES = sorted(path.stem for path in (data_folder("configs") / "styles").glob("*.toml"))
 STUDIES = sorted(path.stem for path in (data_folder("configs") / "ablations").glob("*.toml"))
@@ -37,23 +37,21 @@ TINY = (
     *("--rollout.seconds", "0.3", "--rollout.lanes", "2"),
     *("--examination.candidates", "1", "--examination.draws", "2"),
 )
-"""Options of `train` that make a run of seconds of any configuration; nothing else is changed."""
+"""Options of `train` that shorten any configuration to seconds and change nothing else."""
 FEW_STARTS = ("--rollout.variety", "2")
-"""The same for a configuration that draws other starts in each generation: uneven ground is laid for
-each of them.
-"""
+"""The same if initial conditions change every generation: each needs its own uneven ground."""
 FEW_BLOCKS = (
     *("--controller.nodes", "3", "--controller.parts", "3", "--controller.links", "4"),
     *("--fitness.settle", "0.1"),
 )
-"""The same for bodies that grow: the time to compile goes with the room of a body, and an episode is
-longer than it takes to settle.
+"""The same for modular bodies: compile time grows with the padded size, and an episode must be
+longer than settling.
 """
 
 
 @dataclasses.dataclass(frozen=True)
 class Way:
-    """One way of training that the shipped files name. None: not given on the command line."""
+    """One way of training named by the shipped files. None: not given on the command line."""
 
     creature: str
     task: str | None = None
@@ -84,13 +82,13 @@ def creature_of(name: str) -> Creature:
 
 @functools.cache
 def use_of(name: str) -> UseConfig:
-    """Return the controller and the task that a creature names itself."""
+    """Return the default controller and task of a creature."""
     creature = creature_of(name)
     return resolve_config(creature.settings.train, creature.name).use
 
 
 def tasks_of(name: str) -> list[str]:
-    """Return the tasks of a creature: every task that fits, of the kind of its own."""
+    """Return every task that fits a creature and is related to its own."""
     creature, own = creature_of(name), use_of(name)
     return [task for task in TASKS if _fits(creature, task) and _akin(creature, task, own.task)]
 
@@ -105,8 +103,10 @@ def _fits(creature: Creature, task: str) -> bool:
 
 
 def _akin(creature: Creature, task: str, own: str) -> bool:
-    """Bodies that grow have all tasks that fit. A task of another body is its own or derives from it,
-    or is a plain one, which the smallest walker does.
+    """Return whether a task is related to a creature's own.
+
+    Modular bodies take all tasks. Other creatures take their own task and those derived from it;
+    the smallest walker also takes plain tasks.
     """
     kind = find("task", task)
     if creature.settings.creature.grows or issubclass(kind, find("task", own)):
@@ -128,8 +128,8 @@ def read_config(name: str) -> dict[str, Any]:
 def creatures_of(config: str) -> list[str]:
     """Return the creatures of a configuration.
 
-    They are those whose controller it names. If its file has tables for single creatures, it is
-    trained with all of them, otherwise with the smallest.
+    Candidates have the controller that it names. A file with tables for single creatures takes all
+    of them, any other file the smallest.
     """
     table = read_config(config)
     controller = table.get("use", {}).get("controller", UseConfig.controller)
@@ -138,9 +138,9 @@ def creatures_of(config: str) -> list[str]:
 
 
 def task_of(way: Way) -> str:
-    """Return the task of a way of training, by the name that a user gives it."""
-    asked = way.task or read_config(way.config or "default").get("use", {}).get("task")
-    return asked or use_of(way.creature).task
+    """Return the task of a way of training, as a user types it."""
+    requested = way.task or read_config(way.config or "default").get("use", {}).get("task")
+    return requested or use_of(way.creature).task
 
 
 def first_of_each_task(ways: Iterable[Way]) -> list[Way]:

@@ -1,4 +1,4 @@
-"""Every subcommand ends as it should, on runs that the command made itself."""
+"""Every subcommand succeeds on runs that the command itself made."""
 
 import json
 import shutil
@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from animation.keys.made import columns, swings
 from end_to_end.shipped import CONFIGS, CREATURES, ROOT
 from end_to_end.walks import short_examination, small_settings, trained, walker
 from helpers import STOOL, said_by
-from keys.made import columns, swings
 
 from mjxgait.certification import read_certificate
 from mjxgait.cli import COMMANDS
@@ -20,12 +20,12 @@ ELSEWHERE = {
     "train": "tests/end_to_end/test_trainings.py::test_a_training_ends_with_a_certificate",
     "ablate": "tests/end_to_end/test_studies.py::test_a_study_ends_with_its_report",
     "bench": "tests/bench/test_bench.py::test_the_command_writes_the_ratios",
-    "view": "tests/viewing/test_live.py",
+    "view": "tests/web/test_live.py",
 }
-"""Subcommands that have tests of their own, and where."""
+"""Subcommands with their own tests, and where."""
 
 Made = Callable[[Path], tuple[list[str], str]]
-"""Makes the arguments of a subcommand in a folder, and names the file that it writes there."""
+"""Makes the arguments of a subcommand in a folder, and names the file it writes there."""
 
 
 def of_run(*more: str, writes: str) -> Made:
@@ -78,7 +78,7 @@ EACH = [(name, number) for name, forms in FORMS.items() for number in range(len(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "number"), EACH, ids=[f"{name}-{n}" for name, n in EACH])
-def test_a_subcommand_ends_as_it_should(
+def test_a_subcommand_succeeds(
     name: str, number: int, tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     given, writes = FORMS[name][number](tmp_path)
@@ -87,7 +87,7 @@ def test_a_subcommand_ends_as_it_should(
     assert (tmp_path / writes).exists()
 
 
-def test_every_subcommand_is_in_the_net():
+def test_every_subcommand_is_tested():
     assert FORMS.keys() | ELSEWHERE.keys() == COMMANDS.keys()
     assert not FORMS.keys() & ELSEWHERE.keys()
     for place in ELSEWHERE.values():
@@ -95,14 +95,13 @@ def test_every_subcommand_is_in_the_net():
         assert f"def {test}" in (ROOT / file).read_text(encoding="utf-8")
 
 
-def test_all_that_is_shipped_is_listed(capsys: pytest.CaptureFixture):
+def test_envs_lists_all_creatures_and_configurations(capsys: pytest.CaptureFixture):
     said = said_by(capsys, "envs", code=0)
     assert [line.split()[0] for line in said.splitlines()] == [*CREATURES, *CONFIGS]
 
 
 @pytest.mark.slow
-def test_a_certificate_follows_its_champion(tmp_path: Path, capsys: pytest.CaptureFixture):
-    """`certify` of a run says what the run's own examination said."""
+def test_certify_repeats_the_result_of_the_run(tmp_path: Path, capsys: pytest.CaptureFixture):
     run = trained(tmp_path / "run")
     before = json.loads((run / CERTIFICATE).read_text())
     said_by(capsys, "certify", run, "--config", short_examination(tmp_path), code=0)
@@ -112,7 +111,9 @@ def test_a_certificate_follows_its_champion(tmp_path: Path, capsys: pytest.Captu
 
 
 @pytest.mark.slow
-def test_several_runs_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture):
+def test_each_seed_of_a_multi_seed_run_gets_a_certificate(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+):
     given = ("--env", STOOL, "--config", small_settings(tmp_path), "--generations", 1, "--runs", 2)
     said_by(capsys, "train", *given, "--seed", 3, "--out", "zoo", code=0)
     for seed in (3, 4):

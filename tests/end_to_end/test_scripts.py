@@ -1,4 +1,4 @@
-"""Every script, and every benchmark in its smallest form, ends as it should."""
+"""Every script and every benchmark, in its smallest form, succeeds."""
 
 import importlib.util
 import json
@@ -25,17 +25,17 @@ from mjxgait.training import (
 from mjxgait.training import examination as looks
 
 BLENDER = "needs Blender as a module of Python"
-RAY = "needs Ray; tests/cluster/test_ray.py runs what it measures, where Ray is installed"
+RAY = "needs Ray; tests/distributed/test_ray.py runs what it measures, where Ray is installed"
 ELSEWHERE = {
     "in_blender.py": BLENDER,
     "rig_of_blender.py": BLENDER,
     "blender.py": BLENDER,
     "cluster.py": RAY,
     "cluster_faults.py": RAY,
-    "fuzz_readers.py": "needs atheris; tests/keys/test_hostile_keys.py and tests/importing/test_fuzz.py change files too",
+    "fuzz_readers.py": "needs atheris; tests/animation/keys/test_hostile_keys.py and tests/importer/test_fuzz.py change files too",
     "plant_faults.py": "tests/test_faults.py runs it on a tree of its own",
 }
-"""What is not run here, and why."""
+"""Scripts not run here, and why."""
 
 Given = Callable[[Path], list[str]]
 STOOLS = ["--env", str(STOOL)]
@@ -122,7 +122,7 @@ LONG = (
 
 
 def certified(folder: Path) -> Path:
-    """A run whose champion treads, with the certificate that it has."""
+    """A run with a champion that treads on the spot, and its certificate."""
     run = walker(folder)
     given = ["certify", str(run), "--config", short_examination(folder.parent)]
     subprocess.run(python_command("mjxgait", *given), check=True)
@@ -131,7 +131,7 @@ def certified(folder: Path) -> Path:
 
 @pytest.fixture
 def as_it_was():
-    """Undoes what a benchmark changes in this process."""
+    """Undo a benchmark's changes to this process."""
     watched = (
         loop,
         stages,
@@ -158,8 +158,8 @@ COMPILES = pytest.mark.thorough("compiles for up to half a minute; what it runs 
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=COMPILES) if n in LONG else n for n in FORMS]
 )
-def test_a_script_ends_as_it_should(name: str, tmp_path: Path, as_it_was, request):
-    """In a copy of its folder, for some write into the documentation beside it."""
+def test_a_script_succeeds(name: str, tmp_path: Path, as_it_was, request):
+    """In a copy of its folder, because some scripts write into `docs/` beside it."""
     if name == "store_walk.py":
         request.getfixturevalue("examined_in_full")
     where = "scripts" if name in SCRIPTS else "benchmarks"
@@ -175,14 +175,14 @@ def test_a_script_ends_as_it_should(name: str, tmp_path: Path, as_it_was, reques
 
 
 @pytest.mark.parametrize("name", ELSEWHERE)
-def test_what_is_left_out_has_a_reason(name: str):
+def test_scripts_left_out_have_a_reason(name: str):
     if ELSEWHERE[name] is BLENDER and importlib.util.find_spec("bpy") is None:
         pytest.skip(BLENDER)
     if ELSEWHERE[name] is RAY and importlib.util.find_spec("ray") is None:
         pytest.skip(RAY)
 
 
-def test_every_script_is_in_the_net():
+def test_every_script_is_tested():
     assert FORMS.keys() | ELSEWHERE.keys() == {*BENCHMARKS, *SCRIPTS}
     assert not FORMS.keys() & ELSEWHERE.keys()
     assert not {*BENCHMARKS} & {*SCRIPTS}

@@ -1,4 +1,4 @@
-"""Every shipped study runs to its report: its own variants, with few individuals and short episodes."""
+"""Every shipped study ends with its report, with few individuals and short episodes."""
 
 import tomllib
 from pathlib import Path
@@ -13,16 +13,16 @@ from mjxgait.config.tables import merge
 from mjxgait.experiments.ablation.plan import Study, read_study
 
 SEEDS = 2
-"""The fewest seeds of a study."""
+"""Minimum number of seeds of a study."""
 
 
 def shrunk(name: str) -> dict:
     """The study on a small body, each variant with few individuals and short episodes."""
     path = data_folder("configs") / "ablations" / f"{name}.toml"
     study = tomllib.loads(path.read_text(encoding="utf-8"))
-    # The thesis's configuration has 40 of its own.
+    # Configuration wilson has its own population of 40.
     few: dict = {"evolution": {"population": 4}, "rollout": {"seconds": 0.3, "lanes": 2}}
-    if "grounds" in study:  # rough ground is laid for each start that is ever drawn
+    if "grounds" in study:  # every initial condition drawn needs its own rough ground
         few["rollout"]["variety"] = 2
     if study.get("env") == "blocks":
         few["fitness"] = {"settle": 0.1}
@@ -39,7 +39,7 @@ def shrunk(name: str) -> dict:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_ends_with_its_report(name: str, tmp_path: Path, capsys: pytest.CaptureFixture):
-    """With `--thorough` every study is evolved; tests/ablation evolves one."""
+    """`--thorough` evolves every study; tests/experiments/ablation evolves one."""
     file, out = tmp_path / f"{name}.toml", tmp_path / "out"
     file.write_text(tomli_w.dumps(shrunk(name)))
     rows = ("--rows", SEEDS) if name == "null" else ()
@@ -55,17 +55,15 @@ def test_a_study_ends_with_its_report(name: str, tmp_path: Path, capsys: pytest.
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_a_study_can_be_run_as_it_is_shipped(name: str, capsys: pytest.CaptureFixture):
-    """All its variants, on its own creature: each can be examined in the end. Few seeds: they differ in
-    nothing else.
-    """
+def test_a_shipped_study_can_be_run_unchanged(name: str, capsys: pytest.CaptureFixture):
+    """All variants on their own creature can be certified; seeds differ in nothing else."""
     study = read_study(Path(name), {})
     few = ("--dry-run", "--seeds", SEEDS)
     said = said_by(capsys, "ablate", name, *few, "--hours", 1000, code=0)
     assert f"{SEEDS} seeds = {SEEDS * len(study.variant)} runs in" in said
 
 
-def test_there_are_studies():
+def test_the_studies_cover_a_walker_blocks_and_the_lamp():
     assert {"thesis", "blocks", "lamp"} <= set(STUDIES)
     assert {shrunk(name)["env"] for name in STUDIES} == {str(STOOL), "blocks", "luxo"}
     assert all(creature_of(name) for name in ("blocks", "luxo"))

@@ -1,4 +1,4 @@
-"""Every shipped configuration, with every creature and task that it names, runs to its certificate.
+"""Every shipped configuration ends with a certificate, for each creature and task that it names.
 
 `python -m pytest tests/end_to_end/test_trainings.py --matrix FILE` also writes a table of them
 (docs/testing.md).
@@ -46,22 +46,24 @@ from mjxgait.training.folder import (
 
 WAYS = list(trainings())
 TRAINED = {
-    "walk": "tests/test_run.py",
-    "hop": "tests/test_hop.py",
-    "limbo": "tests/test_limbo.py",
-    "swim": "tests/blocks/test_swimming.py",
-    "follow-on-land": "tests/blocks/test_roaming.py",
-    **dict.fromkeys(("jump", "follow"), "tests/blocks/test_roaming.py"),
-    "travel": "tests/test_travel.py",
+    "walk": "tests/training/test_run.py",
+    "hop": "tests/tasks/hop/test_hop.py",
+    "limbo": "tests/tasks/hop/test_limbo.py",
+    "swim": "tests/tasks/modular/test_swimming.py",
+    "follow-on-land": "tests/tasks/modular/test_roaming.py",
+    **dict.fromkeys(("jump", "follow"), "tests/tasks/modular/test_roaming.py"),
+    "travel": "tests/tasks/hop/test_travel.py",
 }
-"""Tasks that another test evolves, and where. Of those of test_roaming.py it evaluates individuals on
-land, and compares parts of the others with the examiner; `--thorough` evolves them.
+"""Tasks that another test evolves, and where.
+
+test_roaming.py evaluates individuals on land, and compares parts of its other tasks with the
+reference simulator; `--thorough` evolves them.
 """
 EVOLVED = [way for way in first_of_each_task(WAYS) if task_of(way) not in TRAINED]
 
 
 def train(capsys: pytest.CaptureFixture, folder: Path, *given: str) -> dict:
-    """Train, and return the certificate; the run folder must be whole."""
+    """Train, check the run folder, and return the certificate."""
     said_by(capsys, "train", *TINY, *given, "--out", folder, code=0)
     document = json.loads((folder / CERTIFICATE).read_text())
     _, champion = open_champion(folder)
@@ -76,7 +78,7 @@ HEADER = "| configuration | creature | task | certificate | processor, s |\n|---
 
 @pytest.fixture
 def told(request: pytest.FixtureRequest) -> Iterator[Callable[[Way, str, dict], None]]:
-    """Takes what came of a training, for the table of `--matrix`; processor seconds of this process."""
+    """Collects results for the table of `--matrix`, with the CPU seconds of this process."""
     file, began, rows = request.config.getoption("--matrix"), time.process_time(), []
 
     def tell(way: Way, task: str, document: dict) -> None:
@@ -94,20 +96,20 @@ def told(request: pytest.FixtureRequest) -> Iterator[Callable[[Way, str, dict], 
 @pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS, ids=[way.name for way in WAYS])
 def test_a_training_ends_with_a_certificate(way: Way, tmp_path: Path, capsys, told, request):
-    """Without `--thorough` it evolves if no other test trains its task."""
+    """Without `--thorough` it only evolves if no other test trains its task."""
     if way in EVOLVED:
         request.getfixturevalue("evolving")
     document = train(capsys, tmp_path / "run", *way.arguments)
     _, config = open_run(tmp_path / "run")
     told(way, config.use.task, document)
-    asked = way.task or (way.config and read_config(way.config).get("use", {}).get("task"))
-    task = asked or use_of(way.creature).task
+    requested = way.task or (way.config and read_config(way.config).get("use", {}).get("task"))
+    task = requested or use_of(way.creature).task
     if creature_of(way.creature).settings.creature.grows:
         task = meant_of_grown(task)
     assert config.use.task == document["task"] == task
 
 
-def test_the_ways_cover_all_that_is_shipped():
+def test_the_trainings_cover_all_that_is_shipped():
     assert {way.creature for way in WAYS} == set(CREATURES)
     assert {way.config for way in WAYS} - {None} == set(CONFIGS)
     assert {way.style for way in WAYS} - {None} == set(STYLES)
@@ -122,13 +124,12 @@ def test_the_ways_cover_all_that_is_shipped():
     assert paper == all_of_blocks >= {None, "walk", "jump", "follow", "follow-on-land"}
 
 
-def test_every_task_evolves():
+def test_every_task_is_evolved_by_a_test():
     assert {task_of(way) for way in EVOLVED} == {task_of(way) for way in WAYS} - TRAINED.keys()
     assert all((ROOT / file).is_file() for file in TRAINED.values())
 
 
-def test_every_file_of_configurations_is_one():
-    """No file of settings lies where nothing finds it."""
+def test_every_settings_file_is_in_a_known_folder():
     files = {path.relative_to(ROOT / "configs") for path in (ROOT / "configs").rglob("*.toml")}
     assert {path.parts[0] for path in files if len(path.parts) > 1} == {
         "ablations",
@@ -147,14 +148,14 @@ UNTRAINED = [
     for name in WALKERS
     if Way(name, config=config) not in WAYS
 ]
-"""Configurations and walkers that `test_a_training_ends_with_a_certificate` does not put together."""
+"""Configurations and walkers that `test_a_training_ends_with_a_certificate` does not combine."""
 
 
 @pytest.mark.parametrize(("config", "name"), UNTRAINED)
-def test_every_walker_can_be_examined_under_every_configuration(
+def test_every_walker_can_be_checked_with_every_configuration(
     config: str, name: str, tmp_path: Path
 ):
-    """From the new run folder to the look in C MuJoCo, without evolution: poses about the stand."""
+    """From a new run folder to the nominal check in C MuJoCo, with the stand as key poses."""
     creature = creature_of(name)
     settings = resolve_config(creature.settings.train, name, Path(config))
     folder = create_run(tmp_path / "run", creature, settings)
@@ -181,11 +182,13 @@ VARIANTS = {
         *("--way", "back", "--scale", "front*=1.1", "--ground", "rough:0.03", *FEW_STARTS),
     ),
 }
-"""What changes the creature, or the simulator, before the examiner sees the champion."""
+"""Options that change the creature or the simulator before certification."""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VARIANTS)
-def test_what_changes_the_body_ends_with_a_certificate(name: str, tmp_path: Path, capsys):
-    """With `--thorough` it evolves; tests/test_mjx.py and tests/test_evolve_body.py always do."""
+def test_a_changed_body_or_simulator_ends_with_a_certificate(name: str, tmp_path: Path, capsys):
+    """`--thorough` evolves; tests/physics/test_mjx.py and
+    tests/training/test_evolve_body.py always do.
+    """
     train(capsys, tmp_path / "run", "--env", str(STOOL), *VARIANTS[name])

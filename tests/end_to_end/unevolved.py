@@ -1,4 +1,4 @@
-"""Generations in which nothing is simulated, for tests of everything around them."""
+"""Generations without simulation, for tests of everything around them."""
 
 import contextlib
 import dataclasses
@@ -20,7 +20,7 @@ from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.training.checkpoint import pack
 from mjxgait.training.experiment import Experiment
-from mjxgait.training.prescreen import Tryout
+from mjxgait.training.prescreen import Prescreen
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 
@@ -30,14 +30,14 @@ def unevolved(
 ) -> tuple[Step, EvolutionState]:
     """Stand in for `loop._compiled`: the first population stays, and no program is compiled.
 
-    The body, the settings, the starts and the genomes are made as in a real run.
+    Body, settings, initial conditions and genomes are made as in a real run.
     """
     step = partial(generation, follows=experiment.config.evolution.follows)
     return step, embodied(experiment) if restored is None else restored
 
 
 def embodied(experiment: Experiment) -> EvolutionState:
-    """Return the first state, turned until its first genome grows a body that can move."""
+    """Return the first state, rotated until its first genome grows a body that can move."""
     state = experiment.init()
     known = dataclasses.replace(state, fitness=jnp.zeros_like(state.fitness))
     for place in range(len(state.fitness)):
@@ -49,20 +49,20 @@ def embodied(experiment: Experiment) -> EvolutionState:
     raise AssertionError("none of the first population can move")
 
 
-def untried(tryout: Tryout) -> Callable[..., SimpleNamespace]:
-    """Stand in for `Tryout._program`: made-up outcomes, and no program is compiled."""
-    names = tryout._trials.simulator.task.outcomes
+def untried(prescreen: Prescreen) -> Callable[..., SimpleNamespace]:
+    """Stand in for `Prescreen._program`: made-up metrics, and no program is compiled."""
+    names = prescreen._trials.simulator.task.outcomes
 
-    def judged(numbers: Any, settings: Any, starts: Any, genomes: Any) -> SimpleNamespace:
+    def evaluation(numbers: Any, settings: Any, starts: Any, genomes: Any) -> SimpleNamespace:
         individuals, trials = (jax.tree.leaves(rows)[0].shape[1] for rows in (genomes, starts))
         outcome = np.broadcast_to(_made_up(len(names)), (1, individuals, trials, len(names)))
         return SimpleNamespace(outcome=outcome)
 
-    return judged
+    return evaluation
 
 
 def _made_up(count: int) -> np.ndarray:
-    """Outcomes of which none is zero and no two are equal: some are divided by a difference."""
+    """Metrics that are nonzero and all different: some are divided by a difference."""
     return 0.25 + 0.01 * np.arange(count, dtype=np.float32)
 
 
@@ -92,9 +92,9 @@ def generation(
 
 
 class Unevolved(LocalBackend):
-    """A worker that evolves nothing: champions are the first of the first population.
+    """A worker without evolution: champions are the first of the first population.
 
-    Bodies, settings, starts and genomes are made as ever; no generation is compiled.
+    Bodies, settings, initial conditions and genomes are real; no generation is compiled.
     """
 
     def wait(self, seconds: float) -> list[Report]:
@@ -106,7 +106,7 @@ class Unevolved(LocalBackend):
 
 
 def first_population(programs: Programs, recipe: Recipe, job: AdvanceRows) -> Advanced:
-    """Return what evolution would, as if nothing came of it."""
+    """Return the result of an evolution without progress."""
     batch = programs.batch(recipe)
     packed = job.state or pack(batch.init())
     rows = range(len(batch.experiments))
@@ -121,7 +121,7 @@ def first_population(programs: Programs, recipe: Recipe, job: AdvanceRows) -> Ad
 
 
 def line_of(generation: int) -> dict[str, Any]:
-    """Return a line of the log of a run that has not got better."""
+    """Return a log line of a run without progress."""
     counts = {"sim_steps": 10, "failures": 0, "episodes": 4}
     values = {"best": 0.5, "mean": 0.25, "forced": False, "term_distance": 0.5}
     return {"generation": generation} | counts | values

@@ -1,4 +1,4 @@
-"""Small runs that the command itself has made, once for all tests of a process."""
+"""Small runs made by the command itself, once per process."""
 
 import contextlib
 import functools
@@ -10,7 +10,7 @@ from pathlib import Path
 import tomli_w
 from end_to_end.shipped import TINY
 from helpers import SHORT, STOOL
-from viewing.made_up import falling, treading
+from rendering.made_up import falling, treading
 
 from mjxgait.champion import write_champion
 from mjxgait.cli import main
@@ -34,12 +34,12 @@ SHORTER = _KNOWN | {
     "pushes": _KNOWN["pushes"] | {"window": [0.4, 0.6], "ladder_seconds": 0.5},
     **{"hop": {"stay": 0.5}, "limbo": {"stay": 0.5}},
 }
-"""An examination of 1.2 s; a lamp is to be at rest for half a second at its end."""
+"""An examination of 1.2 s; a lamp must be at rest for the last half second."""
 
 
 @functools.cache
 def _made(*given: str) -> tempfile.TemporaryDirectory:
-    """A run in a folder that stays as long as the process."""
+    """A run in a folder that lasts as long as the process."""
     folder = tempfile.TemporaryDirectory(prefix="mjxgait-end-to-end-")
     with contextlib.suppress(SystemExit):
         main(["train", *TINY, *given, "--out", f"{folder.name}/run"])
@@ -47,18 +47,18 @@ def _made(*given: str) -> tempfile.TemporaryDirectory:
 
 
 def trained(folder: Path, *given: str) -> Path:
-    """A copy of a run that was evolved and examined; by default the smallest creature's."""
+    """A copy of an evolved and examined run, by default the smallest creature's."""
     shutil.copytree(Path(_made(*(given or ("--env", str(STOOL)))).name) / "run", folder)
     return folder
 
 
 def walker(folder: Path) -> Path:
-    """The same with a champion that treads on the spot, of which a loop can be made."""
+    """The same with a champion that treads on the spot, which makes a loop."""
     return _with(treading, folder)
 
 
 def faller(folder: Path) -> Path:
-    """The same with a champion that falls at once, whose longest trials take no time."""
+    """The same with a champion that falls at once, so that long trials take no time."""
     return _with(falling, folder)
 
 
@@ -71,14 +71,14 @@ def _with(made_up, folder: Path) -> Path:
 
 
 def short_examination(folder: Path) -> str:
-    """A file of settings of the examination, for `certify`, whose file states what differs."""
+    """Examination settings for `certify`, which needs only the values that differ."""
     file = folder / "short.toml"
     file.write_text(tomli_w.dumps(SHORTER))
     return str(file)
 
 
 def small_settings(folder: Path) -> str:
-    """A file of settings with few individuals and short episodes."""
+    """A settings file with few individuals and short episodes."""
     file = folder / "small.toml"
     file.write_text(SMALL)
     return str(file)

@@ -1,4 +1,4 @@
-"""A run folder with checkpoints, written without training anything."""
+"""A run folder with checkpoints, written without training."""
 
 import json
 import shutil
@@ -54,5 +54,5 @@ def finished_run(tmp_path_factory):
 
 @pytest.fixture
 def run(finished_run, tmp_path):
-    """A copy to damage."""
+    """A copy that a test may damage."""
     return shutil.copytree(finished_run, tmp_path / "walk")

@@ -1,4 +1,4 @@
-"""A made-up evolution state of known values."""
+"""A made-up evolution state with known values."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,12 +14,13 @@ from mjxgait.tasks.walk.task import Walk
 POPULATION = 6
 LAST = 3
 FORCED = 2
-"""The generation that was forced."""
+"""The generation in a forced phase."""
 
 
 def make_state(creature, config, generation):
-    """Everybody's poses are the first key pose of rank 1 moved by the rank and the generation,
-    in degrees.
+    """State of a generation.
+
+    All poses of an individual are the standing pose plus rank and generation in degrees.
     """
     ranks = np.arange(POPULATION)
     poses = (

@@ -1,4 +1,4 @@
-"""Who races: the best of a population, or of several generations."""
+"""Participants of a race: the best of a population or of several generations."""
 
 import pytest
 from inspection.made_up import POPULATION
@@ -24,7 +24,7 @@ def test_the_champion_has_no_label(finished_run):
     assert champion_of(finished_run, 0.1).label == ""
 
 
-def test_what_is_not_there_is_said(finished_run):
+def test_a_missing_rank_or_generation_is_named(finished_run):
     with pytest.raises(UserError, match="ranks 1 to"):
         top_of(finished_run, POPULATION + 1, 0.1)
     with pytest.raises(UserError, match="no checkpoint of generation 99"):

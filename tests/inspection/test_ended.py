@@ -1,4 +1,4 @@
-"""A run that is over is known as such from its folder, with what would go on with it."""
+"""Recognition of a finished run from its folder, with the options that would continue it."""
 
 import dataclasses
 import json
@@ -28,7 +28,7 @@ def certify(run, passed=True, **others):
 
 
 def said(run, evolution=None, examination=None, kept=None):
-    """Of a run that is gone on with by these settings."""
+    """Message on a run that is continued with these settings."""
     creature, config = open_run(run)
     config = dataclasses.replace(
         config,
@@ -38,14 +38,16 @@ def said(run, evolution=None, examination=None, kept=None):
     return nothing_left(run, creature, config, config if kept is None else open_run(run)[1])
 
 
-def onward(run, *options):
+def next_goal(run, *options):
     return f"To go on: mjxgait train --resume {run} {' '.join(map(str, options))}"
 
 
-def test_all_generations_are_done(run):
+def test_the_last_generation_ends_the_run(run):
     certify(run, passed=False)
     told = said(run)
-    assert told == f"{run}: nothing is left to do: {ALL}. {onward(run, '--generations', 2 * LAST)}"
+    assert (
+        told == f"{run}: nothing is left to do: {ALL}. {next_goal(run, '--generations', 2 * LAST)}"
+    )
     assert said(run, {"generations": LAST + 1}, {"every": 0}) is None
 
 
@@ -60,43 +62,43 @@ def test_all_generations_are_done(run):
     ],
     ids=["no certificate", "of another", "a damaged one", "a damaged champion", "no champion"],
 )
-def test_without_a_champion_and_its_certificate_something_is_left_to_do(run, spoil):
+def test_without_champion_or_certificate_the_run_is_not_finished(run, spoil):
     certify(run)
     assert said(run)
     spoil(run)
     assert said(run) is None
 
 
-def test_where_nobody_is_examined_nothing_waits_for_a_certificate(run):
+def test_without_examinations_no_certificate_is_needed(run):
     assert said(run) is None
     assert ALL in said(run, examination={"candidates": 0})
 
 
-def test_another_examination_goes_on(run):
+def test_another_level_of_examination_continues_the_run(run):
     certify(run)
     assert said(run, examination={"level": "anywhere"}, kept="as it was") is None
 
 
-def test_a_certificate_ended_it(run):
+def test_a_certificate_ends_the_run(run):
     certify(run)
     early = {"generations": 9}, {"every": LAST}
     told = said(run, *early)
     assert f"certified with a margin of 0.50 in generation {LAST}. " in told
-    assert told.endswith(onward(run, "--examination.every", 0))
+    assert told.endswith(next_goal(run, "--examination.every", 0))
     certify(run, passed=False)
     assert said(run, *early) is None
 
 
-def test_the_target_is_reached(run):
+def test_reaching_the_target_ends_the_run(run):
     certify(run)
     told = said(run, {"generations": 9, "target": 1.0})
     assert "the target fitness of 1 is reached" in told
-    assert told.endswith(onward(run, "--evolution.target", None))
+    assert told.endswith(next_goal(run, "--evolution.target", None))
     both = said(run, {"target": 1.0})
-    assert both.endswith(onward(run, "--evolution.target", None, "--generations", 2 * LAST))
+    assert both.endswith(next_goal(run, "--evolution.target", None, "--generations", 2 * LAST))
 
 
-def test_what_forced_evolution_ended_does_not_go_on(run):
+def test_failed_forced_phases_end_the_run(run):
     certify(run)
     _, config = open_run(run)
     forced = dataclasses.replace(config.evolution.forced, patience=1)
@@ -115,7 +117,7 @@ def test_what_forced_evolution_ended_does_not_go_on(run):
     assert dataclasses.replace(snapshot, config=several).ended is None
 
 
-def test_no_checkpoint_is_no_end(run):
+def test_without_a_checkpoint_the_run_is_not_finished(run):
     certify(run)
     for folder in (run / "checkpoints").iterdir():
         folder.rename(folder.with_name(f"{folder.name}.tmp"))

@@ -1,6 +1,4 @@
-"""`mjxgait inspect` tells what a checkpoint holds, quickly, and says clearly what is wrong with
-one that is not whole.
-"""
+"""`mjxgait inspect`: contents of a checkpoint, and clear messages on damaged ones."""
 
 import dataclasses
 import json
@@ -32,15 +30,15 @@ from mjxgait.training.stored import locked
 
 
 def tell(capsys, *arguments):
-    """Exit code and what was printed."""
+    """Exit code and printed text."""
     with pytest.raises(SystemExit) as ended:
         main(["inspect", *map(str, arguments)])
     said = capsys.readouterr()
     return ended.value.code, said.out + said.err
 
 
-def test_reads_where_other_devices_are(finished_run):
-    """How long it takes is a figure of benchmarks/inspect_seconds.py, not of a test."""
+def test_a_run_is_read_with_another_number_of_devices(finished_run):
+    """benchmarks/inspect_seconds.py measures the time."""
     done = subprocess.run(
         [sys.executable, "-m", "mjxgait", "inspect", str(finished_run), "--json"],
         env=os.environ | {"JAX_NUM_CPU_DEVICES": "3"},
@@ -51,7 +49,7 @@ def test_reads_where_other_devices_are(finished_run):
     assert json.loads(done.stdout)["generation"] == LAST
 
 
-def test_tells_what_it_is(finished_run):
+def test_the_facts_describe_the_run(finished_run):
     found = facts(read_snapshot(finished_run))
     assert (found["creature"], found["seed"], found["generation"], found["intact"]) == (
         "tall_quadruped",
@@ -67,8 +65,8 @@ def test_tells_what_it_is(finished_run):
     assert found["bytes"] > 1000
 
 
-def test_of_a_run_by_other_terms_all_else_is_told(finished_run):
-    """Whose fitness had one less."""
+def test_a_run_with_other_terms_keeps_all_other_facts(finished_run):
+    """Its fitness had one term less."""
     snapshot = read_snapshot(finished_run)
     older = {**snapshot.arrays, "terms": snapshot.arrays["terms"][..., 1:]}
     now, found = facts(snapshot), facts(dataclasses.replace(snapshot, arrays=older))
@@ -78,7 +76,7 @@ def test_of_a_run_by_other_terms_all_else_is_told(finished_run):
         assert found[name] == now[name]
 
 
-def test_tells_whether_the_certificate_is_the_champions(run):
+def test_the_certificate_is_compared_with_the_champion(run):
     def said():
         return facts(read_snapshot(run))["certificate"]
 
@@ -114,7 +112,7 @@ def test_tells_whether_the_certificate_is_the_champions(run):
     assert "not a certificate" in said()
 
 
-def test_an_examination_again_ends_with_zero_only_if_all_is_equal(run, capsys, monkeypatch):
+def test_verify_exits_with_0_only_if_all_measures_are_equal(run, capsys, monkeypatch):
     fingerprint = read_champion(run / CHAMPION, read_snapshot(run).creature).fingerprint
     again = made_up_certificate(fingerprint)
     found = SimpleNamespace(document=lambda: again)
@@ -138,7 +136,7 @@ def test_a_damaged_champion_gets_one_sentence_everywhere(run, capsys, tmp_path, 
     assert sentence.startswith(f"{run / CHAMPION}: damaged, or not a champion file (")
     assert sentence.endswith(f"; write it anew with: mjxgait train --resume {run}")
     assert one["certificate"] == sentence
-    whole = "".join(sentence.split())  # as a table wraps it
+    whole = "".join(sentence.split())  # without the table's line breaks
     said = tell(capsys, run)[1]
     assert "".join(said.split()).count(whole) == 1
     assert "no champion" not in said
@@ -151,7 +149,7 @@ def test_a_damaged_champion_gets_one_sentence_everywhere(run, capsys, tmp_path, 
         assert sentence in said_by(capsys, command[0], run, *command[1:], code=2)
 
 
-def test_of_a_damaged_champion_it_is_not_said_whether_a_certificate_ended_the_run(run, capsys):
+def test_with_a_damaged_champion_the_end_of_the_run_is_unknown(run, capsys):
     config = run / "config.toml"
     config.write_text(config.read_text().replace(f"generations = {LAST}", "generations = 99"))
     assert "not finished" in tell(capsys, run)[1]
@@ -159,8 +157,8 @@ def test_of_a_damaged_champion_it_is_not_said_whether_a_certificate_ended_the_ru
     assert "not known without the champion" in tell(capsys, run)[1]
 
 
-def test_tells_whether_the_champion_walks_anywhere(run):
-    """Of trials of this champion, and with the names of those that it fails."""
+def test_walking_anywhere_is_reported(run):
+    """Only trials of this champion count; the failed ones are named."""
     snapshot = read_snapshot(run)
     fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
     certificate = made_up_certificate(fingerprint)
@@ -189,8 +187,8 @@ def test_tells_whether_the_champion_walks_anywhere(run):
     assert anywhere is None
 
 
-def test_a_folder_of_runs_tells_which_of_them_walk(run, capsys):
-    """By margin, speed and gait of a certificate that counts."""
+def test_a_folder_of_runs_shows_which_of_them_walk(run, capsys):
+    """It shows margin, speed and gait of a valid certificate."""
     snapshot = read_snapshot(run)
     fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
     report = {"speed": 1.25, "gait": "trot", "summary": "trot, 1.25 m/s"}
@@ -215,7 +213,7 @@ def test_a_folder_of_runs_tells_which_of_them_walk(run, capsys):
     assert "not examined" in told()
 
 
-def test_a_few_individuals_are_shown_and_all_of_them_where_asked(finished_run, capsys, monkeypatch):
+def test_a_few_individuals_are_shown_and_all_with_an_option(finished_run, capsys, monkeypatch):
     monkeypatch.setattr(text, "FEW", 4)
     few, every = (tell(capsys, finished_run, *more)[1] for more in ((), ("--all",)))
     assert f"… and {POPULATION - 4} more; --all shows them" in few
@@ -227,7 +225,7 @@ def test_contributions_of_the_terms_add_up_to_the_fitness(finished_run):
         assert sum(row["contributions"].values()) == pytest.approx(row["fitness"], abs=1e-5)
 
 
-def test_population_tells_age_and_kind(finished_run):
+def test_the_population_has_age_and_kind(finished_run):
     rows = facts(read_snapshot(finished_run))["population"]
     assert [row["kind"] for row in rows[:4]] == ["crossover", "mutation", "newcomer", "initial"]
     assert {row["age"] for row in rows} == {1}
@@ -242,13 +240,13 @@ def test_diversity_is_the_spread_in_degrees(finished_run):
     }
 
 
-def test_forced_spells_are_told(finished_run):
+def test_forced_phases_are_reported(finished_run):
     (spell,) = facts(read_snapshot(finished_run))["forced_spells"]
     assert (spell["first"], spell["last"]) == (FORCED, FORCED)
     assert spell["best_after"] > spell["best_before"]
 
 
-def test_an_earlier_generation_and_one_individual(finished_run):
+def test_an_earlier_generation_and_one_individual_can_be_read(finished_run):
     early = read_snapshot(finished_run, 1)
     assert early.generation == 1
     assert [line["generation"] for line in early.lines] == [0, 1]
@@ -260,7 +258,7 @@ def test_an_earlier_generation_and_one_individual(finished_run):
     assert moved == pytest.approx(1.0, abs=1e-4)
 
 
-def test_a_checkpoint_folder_names_itself(finished_run):
+def test_a_checkpoint_folder_selects_its_generation(finished_run):
     assert read_snapshot(finished_run / "checkpoints" / "2").generation == 2
 
 
@@ -294,7 +292,7 @@ def test_everything_can_be_printed(finished_run, capsys):
     assert code == 0
 
 
-def test_a_folder_of_runs_has_one_line_each(run, capsys):
+def test_a_folder_of_runs_has_one_line_per_run(run, capsys):
     broken = shutil.copytree(run, run.parent / "broken")
     shutil.rmtree(broken / "checkpoints")
     code, said = tell(capsys, run.parent)
@@ -342,7 +340,7 @@ def test_damaged_and_foreign_folders_end_with_a_sentence(run, capsys, damage, wo
     assert str(run) in said
 
 
-def test_damaged_values_are_noticed_and_the_newest_intact_one_is_named(run, capsys):
+def test_damaged_values_are_noticed_and_an_intact_checkpoint_is_named(run, capsys):
     for file in (run / "checkpoints" / str(LAST) / "state").rglob("d/*"):
         content = bytearray(file.read_bytes())
         content[len(content) // 2] ^= 255
@@ -360,13 +358,13 @@ def test_damaged_values_are_noticed_and_the_newest_intact_one_is_named(run, caps
         (["--individual", 0], "ranks 1 to"),
     ],
 )
-def test_what_is_not_there_is_said(finished_run, capsys, arguments, words):
+def test_a_missing_generation_or_individual_is_named(finished_run, capsys, arguments, words):
     code, said = tell(capsys, finished_run, *arguments)
     assert code == 2
     assert words in said
 
 
-def test_a_folder_that_is_nothing_of_ours(tmp_path, capsys):
+def test_other_folders_are_refused(tmp_path, capsys):
     code, said = tell(capsys, tmp_path)
     assert code == 2
     assert "neither a run folder" in said
@@ -375,7 +373,7 @@ def test_a_folder_that_is_nothing_of_ours(tmp_path, capsys):
     assert "no such folder" in said
 
 
-def test_a_run_that_is_alive_is_shown_as_running(run, capsys):
+def test_a_running_run_is_shown_as_running(run, capsys):
     pytest.importorskip("fcntl", reason="this system has no flock")
     with locked(run):
         assert f"runs now: process {os.getpid()} on" in tell(capsys, run)[1]

@@ -1,4 +1,4 @@
-"""One program, many bodies: lanes whose bodies differ, against each body alone and C MuJoCo."""
+"""One program with a different body in each lane, against each body alone and C MuJoCo."""
 
 import dataclasses
 from collections.abc import Callable
@@ -31,13 +31,13 @@ from mjxgait.types import Plant
 BODIES, STEPS = 6, 80
 PLANTS = {"fast": fast_plant, "mjx": mjx_plant}
 TIGHT = {"fast": 1.0, "mjx": 50.0}
-"""Factor on the tolerances of the fast physics: MJX loses more in single precision."""
+"""Factor on the tolerances of lane-major physics: MJX loses more in single precision."""
 
 BARS = {".bars.centre", ".bars.half", ".bars.radius", ".bars.reach"}
 RARE = {"dof_frictionloss", "dof_solref", "dof_solimp", "geom_gap", "geom_solmix"}
 DRY = {".density", ".viscosity"}
 ALIKE = {"fast": BARS | DRY, "mjx": BARS | {f".model['{name}']" for name in RARE}}
-"""What is the same in all the bodies: none is watched for overlap, none has dry friction or swims."""
+"""Equal in all bodies: none is checked for overlap, has dry friction, or swims."""
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ MJX = pytest.mark.thorough("test_weights.py and test_body_parts.py have bodies p
 
 @pytest.fixture(scope="module", params=["fast", pytest.param("mjx", marks=MJX)])
 def plant(request: pytest.FixtureRequest) -> Plant:
-    """Made of a body that none of the lanes has."""
+    """A plant made for a body that is in none of the lanes."""
     model = mujoco.MjModel.from_xml_string(XML)
     return PLANTS[request.param](model, layout_of(model))
 
@@ -83,23 +83,23 @@ def batch(plant: Plant, numbers: list[Any], moment: Moment) -> Callable[..., Any
 
 @pytest.fixture(scope="module")
 def together(plant: Plant, numbers: list[Any], moment: Moment, batch: Callable[..., Any]) -> Any:
-    """All bodies in one batch; lanes in front."""
+    """Results of all bodies in one batch; lanes first."""
     return in_front(plant, batch(*moment.for_plant(plant, stacked(numbers))))
 
 
 def close(ours: Any, theirs: Any, tolerance: float) -> None:
-    """Equal to a fraction of the largest entry."""
+    """Equal within a fraction of the largest entry."""
     most = tolerance * max(np.abs(theirs).max(initial=0), 1e-2)
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=most)
 
 
-def test_the_bodies_differ_in_every_number(numbers: list[Any], plant: Plant):
+def test_the_bodies_differ_in_every_parameter(numbers: list[Any], plant: Plant):
     found = jax.tree_util.tree_leaves_with_path(stacked(numbers))
     alike = {keystr(path) for path, x in found if np.ptp(x, axis=0).max(initial=0) == 0}
     assert alike == ALIKE["fast" if plant.lane_axis else "mjx"]
 
 
-def test_some_touch_the_floor_and_some_do_not(models: list[mujoco.MjModel], moment: Moment):
+def test_some_bodies_touch_the_floor_and_some_do_not(models: list[mujoco.MjModel], moment: Moment):
     data = [one_in_c(model, moment.of(lane)) for lane, model in enumerate(models)]
     assert {0} < {d.ncon for d in data}
 
@@ -121,7 +121,7 @@ def test_each_is_what_it_is_in_c(
         close(after.constraint_force[lane], data.qfrc_constraint, 2e-4 * tight)
 
 
-def test_each_geom_is_as_low_as_in_c(models: list[mujoco.MjModel], moment: Moment, together: Any):
+def test_lowest_points_match_c_mujoco(models: list[mujoco.MjModel], moment: Moment, together: Any):
     """Against MuJoCo's distance of spheres and capsules from a plane; see test_fast_parity."""
     for lane, model in enumerate(models):
         data = one_in_c(model, moment.of(lane))
@@ -132,10 +132,10 @@ def test_each_geom_is_as_low_as_in_c(models: list[mujoco.MjModel], moment: Momen
 
 
 @ALONE
-def test_each_is_what_it_is_alone(
+def test_a_batch_matches_each_body_alone(
     plant: Plant, numbers: list[Any], moment: Moment, together: Any, tight: float
 ):
-    """One body for all lanes, its numbers the inputs of one program."""
+    """One body in all lanes, its parameters as inputs of one program."""
 
     def alone(parameters: Any, *arguments: Any) -> Any:
         return everything(plant.with_parameters(parameters))(*arguments)
@@ -152,10 +152,10 @@ def test_each_is_what_it_is_alone(
             close(a[lane], b[0], 2e-5 * tight)
 
 
-def test_eighty_steps_are_those_of_c(
+def test_eighty_steps_match_c_mujoco(
     plant: Plant, models: list[mujoco.MjModel], numbers: list[Any], batch: Callable[..., Any]
 ):
-    """Through impacts, each body with its own; to what float32 keeps of them."""
+    """Through impacts, different for each body; within float32 accuracy."""
     moment = moments(models, seed=2)
     moment = dataclasses.replace(moment, torque=0.1 * moment.torque)
     state, torque, damping = moment.for_plant(plant, stacked(numbers))
@@ -174,10 +174,10 @@ def test_a_lane_keeps_its_body(plant: Plant, numbers: list[Any], together: Any):
 
 
 @ALONE
-def test_none_is_the_plants_own(
+def test_without_parameters_the_plants_own_body_is_used(
     plant: Plant, moment: Moment, batch: Callable[..., Any], tight: float
 ):
-    """Constants and inputs of the same numbers give the same."""
+    """The same numbers as constants and as inputs give the same result."""
     own = stacked([plant.parameters] * BODIES)
     given, none = moment.for_plant(plant, own), moment.for_plant(plant)
     ours = compiled(everything(plant), *none)(*none)
@@ -188,8 +188,8 @@ def test_none_is_the_plants_own(
         close(np.asarray(a), np.asarray(b), 2e-5 * tight)
 
 
-@pytest.mark.thorough("tests/test_inputs.py compares the programs of whole runs")
-def test_numbers_as_inputs_leave_one_program(plant: Plant, numbers: list[Any], moment: Moment):
+@pytest.mark.thorough("tests/training/test_inputs.py compares the programs of whole runs")
+def test_parameters_as_inputs_share_one_program(plant: Plant, numbers: list[Any], moment: Moment):
     def text(parameters: Any) -> str:
         def program(parameters: Any, *arguments: Any) -> Any:
             return everything(plant.with_parameters(parameters))(*arguments)
@@ -200,7 +200,9 @@ def test_numbers_as_inputs_leave_one_program(plant: Plant, numbers: list[Any], m
     assert text(numbers[0]) == text(numbers[1])
 
 
-def test_constants_make_a_program_each(plant: Plant, numbers: list[Any], moment: Moment):
+def test_parameters_as_constants_make_separate_programs(
+    plant: Plant, numbers: list[Any], moment: Moment
+):
     def text(parameters: Any) -> str:
         other = plant.with_parameters(parameters)
         state = moment.of(0).for_plant(plant)[0]

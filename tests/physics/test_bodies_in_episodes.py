@@ -1,4 +1,4 @@
-"""Episodes whose lanes refill with other bodies, against those of one body at a time."""
+"""Episodes whose lanes refill with different bodies, against episodes with one body."""
 
 import dataclasses
 from typing import Any
@@ -16,7 +16,7 @@ from mjxgait.creature import Creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
 from mjxgait.simulation.rollout import Lane, Simulator
-from mjxgait.tasks.walk.stats import Tally
+from mjxgait.tasks.walk.stats import EpisodeStats
 from mjxgait.training.experiment import build_experiment
 
 BODIES = (1.0, 0.6, 1.7)
@@ -25,7 +25,7 @@ BODIES = (1.0, 0.6, 1.7)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BodyPerStart(Simulator):
-    """numbers: leaves [R, ...], of the bodies that the starts belong to."""
+    """A simulator with one body per start. numbers: body parameters, leaves [R, ...]."""
 
     numbers: Any = None
 
@@ -38,19 +38,21 @@ class BodyPerStart(Simulator):
 
 
 pytestmark = pytest.mark.thorough(
-    "tests/test_evolve_body.py and tests/blocks/test_swimming.py compare episodes of bodies that "
+    "tests/training/test_evolve_body.py and tests/tasks/modular/test_swimming.py compare episodes of bodies that "
     "differ with C MuJoCo, and test_bodies.py compares their steps"
 )
 
 
 @pytest.fixture(scope="module", params=["auto", "mjx"])
-def tallies(request: pytest.FixtureRequest, stool: Creature) -> tuple[Tally, list[Tally]]:
-    """Of three starts with three bodies, together; and of all starts with each body."""
+def statistics(
+    request: pytest.FixtureRequest, stool: Creature
+) -> tuple[EpisodeStats, list[EpisodeStats]]:
+    """Statistics of three starts with three bodies together, and of all starts with each body."""
     settings = {"physics": request.param, "lanes": 2, "starts": len(BODIES), "terminate": False}
     experiment = build_experiment(stool, small_config(rollout=settings))
     simulator, plant = experiment.simulator, experiment.simulator.plant
-    heavier = jax.jit(plant.heavier)
-    numbers = jax.device_get([heavier(plant.parameters, factor) for factor in BODIES])
+    with_mass_scale = jax.jit(plant.with_mass_scale)
+    numbers = jax.device_get([with_mass_scale(plant.parameters, factor) for factor in BODIES])
     box = Box(*simulator.controller.bounds(experiment.config.controller))
     arguments = jax.tree.map(
         lambda leaf: leaf[None],
@@ -61,15 +63,15 @@ def tallies(request: pytest.FixtureRequest, stool: Creature) -> tuple[Tally, lis
         ),
     )
 
-    def mixed(numbers: Any, genomes: Genome, *rest: Any) -> Tally:
+    def mixed(numbers: Any, genomes: Genome, *rest: Any) -> EpisodeStats:
         fields = {f.name: getattr(simulator, f.name) for f in dataclasses.fields(Simulator)}
-        return BodyPerStart(**fields, numbers=numbers).simulate(genomes, *rest).tally
+        return BodyPerStart(**fields, numbers=numbers).simulate(genomes, *rest).stats
 
-    def one(numbers: Any, genomes: Genome, *rest: Any) -> Tally:
+    def one(numbers: Any, genomes: Genome, *rest: Any) -> EpisodeStats:
         own = dataclasses.replace(simulator, plant=plant.with_parameters(numbers))
-        return own.simulate(genomes, *rest).tally
+        return own.simulate(genomes, *rest).stats
 
-    def run(function: Any, *numbers: Any) -> list[Tally]:
+    def run(function: Any, *numbers: Any) -> list[EpisodeStats]:
         numbers = jax.tree.map(jnp.float32, numbers)
         lowered = jax.jit(function).lower(numbers[0], *arguments)
         program = lowered.compile(compiler_options=SLIM)
@@ -77,18 +79,18 @@ def tallies(request: pytest.FixtureRequest, stool: Creature) -> tuple[Tally, lis
 
     same = [stacked([each] * len(BODIES)) for each in numbers]
     together, *alone = run(mixed, stacked(numbers), *same)
-    # Another program of the fast step would take long to compile.
+    # Another program of lane-major physics would take long to compile.
     return together, run(one, *numbers) if request.param == "mjx" else alone
 
 
-def test_every_episode_has_its_own_body(tallies: tuple[Tally, list[Tally]]):
-    together, alone = tallies
+def test_every_episode_keeps_its_own_body(statistics: tuple[EpisodeStats, list[EpisodeStats]]):
+    together, alone = statistics
     for start, theirs in enumerate(alone):
         ours = together.forward[0, :, start]
         np.testing.assert_allclose(ours, theirs.forward[0, :, start], atol=1e-4)
 
 
-def test_the_bodies_walk_differently(tallies: tuple[Tally, list[Tally]]):
-    _, (own, light, heavy) = tallies
+def test_different_bodies_walk_differently(statistics: tuple[EpisodeStats, list[EpisodeStats]]):
+    _, (own, light, heavy) = statistics
     for other in (light, heavy):
         assert np.abs(own.forward - other.forward).max() > 1e-3

@@ -1,4 +1,4 @@
-"""Lanes with bodies of their own for many steps: a shipped quadruped's variants."""
+"""Lanes with different bodies over many steps: variants of a shipped quadruped."""
 
 import jax
 import jax.numpy as jnp
@@ -10,13 +10,13 @@ from many_bodies import compiled, stacked
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.physics import heavier_model
-from mjxgait.physics.derived import sense_layout
+from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.types import BodyState, Plant
 
 
 def after(plant: Plant, state: BodyState, torque: jax.Array, steps: int) -> np.ndarray:
-    """qpos [L, nq] after so many steps under a torque [nv, L] that stays."""
+    """qpos [L, nq] after `steps` steps under a constant torque [nv, L]."""
 
     def step(_: int, state: BodyState) -> BodyState:
         return plant.advance(state, plant.forward(state)[1], torque)
@@ -29,7 +29,7 @@ def after(plant: Plant, state: BodyState, torque: jax.Array, steps: int) -> np.n
 
 @pytest.fixture(scope="module")
 def quadrupeds() -> list[mujoco.MjModel]:
-    """The tall quadruped with its parts' masses, armatures and lengths changed."""
+    """The tall quadruped with changed masses, armatures and lengths."""
     model = load_creature(find_creature("tall_quadruped")).evolution_model
     rng, variants = np.random.default_rng(0), []
     for _ in range(4):
@@ -44,9 +44,9 @@ def quadrupeds() -> list[mujoco.MjModel]:
 
 
 @pytest.mark.thorough("test_bodies.py has eighty steps of another body")
-def test_a_shipped_quadruped_whose_body_is_varied(quadrupeds: list[mujoco.MjModel]):
+def test_variants_of_a_shipped_quadruped_match_c_mujoco(quadrupeds: list[mujoco.MjModel]):
     creature = load_creature(find_creature("tall_quadruped"))
-    layout = sense_layout(creature)
+    layout = observation_layout(creature)
     plant = fast_plant(creature.evolution_model, layout)
     numbers = stacked([plant.parameters_of(model, layout) for model in quadrupeds])
     qpos = np.tile(creature.stand_qpos, (4, 1))

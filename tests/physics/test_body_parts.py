@@ -1,4 +1,4 @@
-"""Which bodies fit a plant made for another one, and what is said of those that do not."""
+"""Bodies that fit a plant made for another body, and the messages for those that do not."""
 
 import dataclasses
 from pathlib import Path
@@ -25,7 +25,7 @@ from mjxgait.types import BodyState
 
 
 def stool_with(folder: Path, *changes: tuple[str, str]) -> Creature:
-    """A stool whose file was edited."""
+    """A stool with an edited model file."""
     folder.mkdir()
     for name in ("creature.toml", "creature.xml"):
         text = (STOOL / name).read_text()
@@ -38,7 +38,7 @@ def stool_with(folder: Path, *changes: tuple[str, str]) -> Creature:
 
 @pytest.fixture(scope="module")
 def tall_stool(tmp_path_factory: pytest.TempPathFactory) -> Creature:
-    """Legs a fifth longer, feet and plate thicker."""
+    """A stool with legs a fifth longer and thicker feet and plate."""
     return stool_with(
         tmp_path_factory.mktemp("tall") / "stool",
         ("0 0 0 0 0 -0.24", "0 0 0 0 0 -0.288"),
@@ -82,7 +82,7 @@ SAID = {
 
 
 @pytest.mark.parametrize("what", OTHERS)
-def test_a_user_is_told_why_a_creature_needs_a_program_of_its_own(
+def test_the_error_says_why_a_creature_needs_its_own_program(
     plants: dict[str, Any], what: str, tmp_path: Path
 ):
     other = stool_with(tmp_path / "other", OTHERS[what])
@@ -93,7 +93,7 @@ def test_a_user_is_told_why_a_creature_needs_a_program_of_its_own(
         assert str(told.value).endswith(f"another: {SAID[physics][what]}")
 
 
-def test_names_are_no_part_of_a_topology():
+def test_names_are_not_part_of_a_topology():
     """Otherwise no second robot would ever fit."""
     model = mujoco.MjModel.from_xml_string(XML)
     renamed = mujoco.MjModel.from_xml_string(XML.replace('body name="', 'body name="other_'))
@@ -104,7 +104,7 @@ def test_names_are_no_part_of_a_topology():
 
 
 def lying(creature: Creature, bodies: int) -> BodyState:
-    """Lanes in front; hips turned so that parts come into each other."""
+    """States with lanes first; the hips are turned so that parts overlap."""
     model = creature.model
     qpos = np.tile(creature.stand_qpos, (bodies, 1))
     qpos[:, creature.joints.qpos_adr] = np.linspace(0.5, 0.6, bodies)[:, None] * (1, 1, -1, -1)
@@ -113,10 +113,10 @@ def lying(creature: Creature, bodies: int) -> BodyState:
 
 
 @pytest.mark.parametrize("physics", ["auto", "mjx"])
-def test_overlap_is_that_of_the_lanes_own_body(
+def test_overlap_is_computed_for_the_lanes_own_body(
     physics: str, plants: dict[str, Any], stool: Creature, tall_stool: Creature
 ):
-    """Which is that of lanes with the same body."""
+    """The same as in a batch in which all lanes have this body."""
     plant = plants[physics]
     both = [parameters_of(plant, creature, True) for creature in (stool, tall_stool)]
     placed = [
@@ -132,7 +132,7 @@ def test_overlap_is_that_of_the_lanes_own_body(
     assert np.abs(alone[0] - alone[1]).min() > 1e-3
 
 
-def test_a_longer_body_is_only_other_numbers(plants: dict[str, Any], tall_stool: Creature):
+def test_a_longer_body_differs_only_in_parameters(plants: dict[str, Any], tall_stool: Creature):
     numbers = parameters_of(plants["auto"], tall_stool, True)
     assert numbers.contacts.radius == pytest.approx([0.035] * 4)
     assert numbers.contacts.center[:, 2] == pytest.approx([-0.324] * 4)

@@ -1,8 +1,8 @@
-"""The same episodes through the fast step, plain MJX and the examiner: every figure must agree.
+"""The same episodes in lane-major physics, plain MJX and the reference simulator: all must agree.
 
-The examiner is C MuJoCo in float64 under a controller of its own; what its recording means for the
-tally is worked out once more, in plain NumPy (`recorded_tally`). Nothing that changes the motion,
-or what is counted of it, on one of the three ways can stay unseen.
+The reference simulator is C MuJoCo in float64 with its own controller. The statistics of its
+recordings are computed again in plain NumPy (`recorded_stats`). A change to the motion or to a
+statistic in one of the three cannot pass unnoticed.
 """
 
 import jax
@@ -29,7 +29,7 @@ from disturbed_walks import (
     watched,
 )
 from helpers import STILL, small_config
-from recorded_tally import Frames, end, tally_of
+from recorded_stats import Frames, end, stats_of
 
 from mjxgait.config.traced import traced
 from mjxgait.controllers.key_poses.controller import TUNING as GENES
@@ -38,11 +38,11 @@ from mjxgait.creature import Creature
 from mjxgait.reference.outcome import Outcome
 from mjxgait.tasks.base import Reason
 from mjxgait.tasks.starts import NEVER, Starts
-from mjxgait.tasks.walk.stats import Tally
+from mjxgait.tasks.walk.stats import EpisodeStats
 from mjxgait.training.experiment import build_experiment
 
 SLIM = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": True}
-"""Compiling is what takes the time here. The older way of emitting rounds otherwise, and one of the episodes ends elsewhere."""
+"""Most of the time is compilation. The older emitter rounds differently and changes an episode."""
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def outcomes(body: Creature) -> list[Outcome]:
 
 
 def starts_of(creature: Creature, films: list[Outcome]) -> Starts:
-    """The same starts for evolution, [B, R]; the examiner lifts bodies with displaced joints."""
+    """The same starts for evolution, [B, R]; certification lifts bodies with displaced joints."""
     rows, wanted = disturbed(creature), []
     push = np.zeros((len(rows), creature.model.nv))
     push[:, :2] = rows.push
@@ -85,8 +85,10 @@ MJX = pytest.mark.thorough("test_ground_parity.py compares the fast step with MJ
     params=["auto", pytest.param("mjx", marks=MJX)],
     ids=["the fast step", "plain MJX"],
 )
-def tallies(request: pytest.FixtureRequest, body: Creature, outcomes: list[Outcome]) -> Tally:
-    """Evolution's, leaves [B, 1, R, ...]."""
+def statistics(
+    request: pytest.FixtureRequest, body: Creature, outcomes: list[Outcome]
+) -> EpisodeStats:
+    """Statistics of evolution, leaves [B, 1, R, ...]."""
     rollout = {"seconds": SECONDS, "lanes": 3, "physics": request.param, **LENIENT}
     simulator = build_experiment(body, small_config(rollout=rollout)).simulator
     genes = STILL | GENES_OF_THE_GAIT
@@ -95,14 +97,14 @@ def tallies(request: pytest.FixtureRequest, body: Creature, outcomes: list[Outco
     settings = jax.tree.map(lambda *leaves: jnp.stack(leaves), *map(traced, CONFIGS))
     arguments = (genomes, starts_of(body, outcomes), settings)
     program = jax.jit(simulator.simulate).lower(*arguments).compile(compiler_options=SLIM)
-    return jax.device_get(program(*arguments)).tally
+    return jax.device_get(program(*arguments)).stats
 
 
 @pytest.fixture(scope="module")
 def expected(
     body: Creature, outcomes: list[Outcome]
 ) -> dict[tuple[str, str], dict[str, np.ndarray]]:
-    """What the examiner's recordings mean for the tally, by settings and disturbance."""
+    """Statistics from the reference simulator's recordings, by settings and disturbance."""
     found = {}
     for name, config, outcome in zip(SETTINGS, CONFIGS, outcomes, strict=True):
         clearance = config.fitness.clearance * body.frame.hip_height
@@ -111,22 +113,26 @@ def expected(
             steps, reason = end(frames, FALL)
             if steps > STEPS:
                 steps, reason = STEPS, Reason.FINISHED
-            tally = tally_of(frames, steps, STEPS // 2, clearance)
-            found[name, disturbance] = {**tally, "reason": reason}
+            stats = stats_of(frames, steps, STEPS // 2, clearance)
+            found[name, disturbance] = {**stats, "reason": reason}
     return found
 
 
-def test_every_field_of_the_tally_is_compared(expected: dict):
+def test_every_statistic_is_compared(expected: dict):
     for name in FIELDS:
-        assert all(name in tally for tally in expected.values()), (
-            f"Tally.{name} is compared with nothing: work it out in recorded_tally.py, or say in "
+        assert all(name in stats for stats in expected.values()), (
+            f"EpisodeStats.{name} is compared with nothing: work it out in recorded_stats.py, or say in "
             f"UNCOMPARED why not"
         )
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_the_tally_is_what_the_examiner_saw(tallies: Tally, expected: dict, name: str):
-    rows = dict(zip(EPISODES, np.reshape(getattr(tallies, name), (len(EPISODES), -1)), strict=True))
+def test_statistics_match_the_reference_simulator(
+    statistics: EpisodeStats, expected: dict, name: str
+):
+    rows = dict(
+        zip(EPISODES, np.reshape(getattr(statistics, name), (len(EPISODES), -1)), strict=True)
+    )
     for episode, ours in rows.items():
         theirs = np.ravel(np.asarray(expected[episode][name], float))
         most = tolerance(name, theirs)
@@ -134,37 +140,37 @@ def test_the_tally_is_what_the_examiner_saw(tallies: Tally, expected: dict, name
 
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "reason"])
-def test_every_field_has_something_to_show(expected: dict, name: str):
-    """A figure that is next to zero in all episodes would agree with anything."""
-    values = [np.asarray(tally[name], float) for tally in expected.values()]
+def test_every_statistic_is_nonzero_somewhere(expected: dict, name: str):
+    """A value near zero in all episodes would agree with anything."""
+    values = [np.asarray(stats[name], float) for stats in expected.values()]
     assert any(np.abs(value).max() > 3 * tolerance(name, value) for value in values)
 
 
 def apart(one: dict, other: dict) -> float:
-    """How many tolerances two episodes differ by in where they lead."""
+    """Distance between the final poses of two episodes, in tolerances."""
     places = ("forward", "left", "heading")
     return max(abs(one[name] - other[name]) / tolerance(name, one[name]) for name in places)
 
 
 @pytest.mark.parametrize("disturbance", list(DISTURBANCES)[1:])
-def test_every_disturbance_shows(expected: dict, disturbance: str):
+def test_every_disturbance_changes_the_motion(expected: dict, disturbance: str):
     one, other = (expected["stable PD", name] for name in (disturbance, "nominal"))
     assert apart(one, other) > 5
 
 
 @pytest.mark.parametrize("settings", list(SETTINGS)[1:])
-def test_all_settings_show(expected: dict, settings: str):
+def test_every_setting_changes_the_motion(expected: dict, settings: str):
     one, other = (expected[name, "pushed to the left"] for name in (settings, "stable PD"))
     assert apart(one, other) > 5
 
 
-def test_a_fall_ends_the_episode_where_the_examiner_sees_it(
-    outcomes: list[Outcome], tallies: Tally
+def test_a_fall_ends_the_episode_at_the_reference_simulators_time(
+    outcomes: list[Outcome], statistics: EpisodeStats
 ):
-    """Why it ended has been compared above; the examiner dates a fall by the end of its step."""
+    """Reasons are compared above; the reference simulator dates a fall by the end of its step."""
     knocked = list(DISTURBANCES).index("knocked over")
     for row, name in enumerate(SETTINGS):
         fell = round(outcomes[row].fell[knocked] / STEP)
         assert PUSH_AT < fell < STEPS, name
-        assert tallies.steps[row, 0, knocked] == fell, name
-        assert tallies.reason[row, 0, knocked] != Reason.FINISHED
+        assert statistics.steps[row, 0, knocked] == fell, name
+        assert statistics.reason[row, 0, knocked] != Reason.FINISHED

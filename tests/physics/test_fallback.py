@@ -1,4 +1,4 @@
-"""Who simulates a creature in plain MJX because the fast physics does not know it, is told so."""
+"""A note says when a creature falls back to plain MJX."""
 
 import shutil
 from contextlib import contextmanager
@@ -35,7 +35,7 @@ def test_the_note_names_the_element_and_the_cost(rusty: Path):
     assert "\n" not in plant.note
 
 
-def test_who_gets_what_he_asked_for_is_told_nothing(stool: Creature, rusty: Path):
+def test_there_is_no_note_without_a_fallback(stool: Creature, rusty: Path):
     fast, _ = make_plant(stool, "auto", True)
     assert isinstance(fast, FastPlant)
     assert fast.note == ""
@@ -43,7 +43,7 @@ def test_who_gets_what_he_asked_for_is_told_nothing(stool: Creature, rusty: Path
     assert fallback_note(stool.evolution_model) == ""
 
 
-def test_check_says_so(rusty: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_check_prints_the_note(rusty: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     check_command([str(rusty), "--out", str(tmp_path / "picture.png")])
     assert fallback_note(load_creature(rusty).evolution_model) in capsys.readouterr().out
     check_command([str(STOOL), "--out", str(tmp_path / "picture.png")])
@@ -51,11 +51,11 @@ def test_check_says_so(rusty: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 class Ready(Exception):
-    """The run is about to compile."""
+    """Raised when the run is about to compile."""
 
 
 class Listener:
-    """A screen that remembers what is said, up to the compilation."""
+    """A screen that records messages up to the compilation."""
 
     def __init__(self) -> None:
         self.said: list[str] = []
@@ -70,7 +70,7 @@ class Listener:
 
 
 @pytest.mark.parametrize(("note", "said"), [("It is slow.", ["It is slow."]), ("", [])])
-def test_a_run_says_so_before_it_compiles(
+def test_a_run_prints_the_note_before_it_compiles(
     note: str, said: list[str], stool: Creature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     experiment = SimpleNamespace(plant_note=note, init=lambda: None, config=small_config())

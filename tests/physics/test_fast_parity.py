@@ -1,4 +1,4 @@
-"""The fast physics against C MuJoCo (float64) and MJX: a body with every joint and contact type it knows, in varied states."""
+"""Lane-major physics against C MuJoCo (float64) and MJX, with all supported joints and contacts."""
 
 import dataclasses
 from collections.abc import Callable
@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.physics.lane_major import FastPlant, fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import BodyState
@@ -62,21 +62,24 @@ XML = f"""
 WATCHED = ("left_foot", "right_foot", "rear_foot", "trunk", "tail")
 LANES = 12
 SLIM = {"xla_backend_optimization_level": 0}
-"""Compiling is what takes the time here."""
+"""Most of the time here is compilation."""
 
 
 @dataclasses.dataclass
 class Scene:
     model: mujoco.MjModel
     plant: FastPlant
-    layout: SenseLayout
+    layout: ObservationLayout
     state: BodyState
     torque: np.ndarray
     damping: np.ndarray
 
 
 def _states(model: mujoco.MjModel) -> BodyState:
-    """Lanes in the air, standing, sliding, tumbling and beyond joint limits, far from the origin, each with its own friction."""
+    """Lanes in the air, standing, sliding, tumbling and beyond joint limits, far from the origin.
+
+    Each lane has its own friction.
+    """
     rng = np.random.default_rng(1)
     qpos = np.tile(model.qpos0[:, None], LANES)
     qpos[0] += 80.0
@@ -97,7 +100,7 @@ def scene() -> Scene:
     model = mujoco.MjModel.from_xml_string(XML)
     hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
     watched = np.array([model.geom(name).id for name in WATCHED])
-    layout = SenseLayout(
+    layout = ObservationLayout(
         model.body("trunk").id, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], watched
     )
     rng = np.random.default_rng(2)
@@ -110,14 +113,14 @@ Everything = Callable[[BodyState, Any, Any], Any]
 
 
 def _everything(plant: Any) -> Everything:
-    """From state, damping and torque to all that the three methods give."""
+    """Function of state, damping and torque with the results of all three methods."""
 
     def everything(state: BodyState, damping: jax.Array, torque: jax.Array) -> Any:
-        sensed, workings = plant.forward(state)
+        sensed, step_data = plant.forward(state)
         return (
             sensed,
-            plant.solve_damped(workings, damping, torque),
-            plant.advance(state, workings, torque),
+            plant.solve_damped(step_data, damping, torque),
+            plant.advance(state, step_data, torque),
         )
 
     return everything
@@ -131,7 +134,7 @@ def step(scene: Scene) -> Everything:
 
 @pytest.fixture(scope="module")
 def result(scene: Scene, step: Everything) -> Any:
-    """(Sensed, damped solution, next state), NumPy."""
+    """Sensed values, damped solution and next state, as NumPy arrays."""
     return jax.tree.map(np.asarray, step(scene.state, scene.damping, scene.torque))
 
 
@@ -154,13 +157,13 @@ def _forward_in_c(scene: Scene, lane: int, advance: bool = False) -> mujoco.MjDa
 
 
 def _close(ours: np.ndarray, theirs: np.ndarray, tolerance: float = 1e-5) -> None:
-    """Equal to a fraction of the largest entry."""
+    """Equal within a fraction of the largest entry."""
     np.testing.assert_allclose(
         ours, theirs, rtol=0, atol=tolerance * max(np.abs(theirs).max(), 1e-2)
     )
 
 
-def test_states_cover_what_can_happen(scene: Scene, references: list[mujoco.MjData]) -> None:
+def test_states_cover_limits_and_contacts(scene: Scene, references: list[mujoco.MjData]) -> None:
     types = [set(np.asarray(data.efc_type[: data.nefc])) for data in references]
     limit, contact = (
         int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT),
@@ -172,7 +175,9 @@ def test_states_cover_what_can_happen(scene: Scene, references: list[mujoco.MjDa
     assert max(data.ncon for data in references) >= 3
 
 
-def test_sensed_terms(scene: Scene, result: Any, references: list[mujoco.MjData]) -> None:
+def test_sensed_values_match_c_mujoco(
+    scene: Scene, result: Any, references: list[mujoco.MjData]
+) -> None:
     sensed, layout = result[0], scene.layout
     for lane, data in enumerate(references):
         velocity = np.zeros(6)
@@ -189,8 +194,10 @@ def test_sensed_terms(scene: Scene, result: Any, references: list[mujoco.MjData]
         _close(sensed.geom_pos[..., lane], data.geom_xpos[layout.watched], 1e-6)
 
 
-def test_lowest_points(scene: Scene, result: Any, references: list[mujoco.MjData]) -> None:
-    """Against the smallest of many points on each shape's surface."""
+def test_lowest_points_match_sampled_surfaces(
+    scene: Scene, result: Any, references: list[mujoco.MjData]
+) -> None:
+    """Against the lowest of many points on each shape's surface."""
     rng = np.random.default_rng(3)
     unit = rng.normal(size=(20000, 3))
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
@@ -215,7 +222,9 @@ def test_lowest_points(scene: Scene, result: Any, references: list[mujoco.MjData
             assert abs(result[0].geom_low[n, lane] - lowest) < 3e-4
 
 
-def test_damped_solve(scene: Scene, result: Any, references: list[mujoco.MjData]) -> None:
+def test_the_damped_solution_matches_c_mujoco(
+    scene: Scene, result: Any, references: list[mujoco.MjData]
+) -> None:
     for lane, data in enumerate(references):
         mass = np.zeros((scene.model.nv, scene.model.nv))
         mujoco.mj_fullM(scene.model, data, mass)
@@ -225,7 +234,9 @@ def test_damped_solve(scene: Scene, result: Any, references: list[mujoco.MjData]
         )
 
 
-def test_acceleration_and_constraint_force(result: Any, references: list[mujoco.MjData]) -> None:
+def test_acceleration_and_constraint_force_match_c_mujoco(
+    result: Any, references: list[mujoco.MjData]
+) -> None:
     for lane, data in enumerate(references):
         scale = np.abs(data.qacc).max()
         np.testing.assert_allclose(
@@ -234,7 +245,7 @@ def test_acceleration_and_constraint_force(result: Any, references: list[mujoco.
         _close(result[2].constraint_force[:, lane], data.qfrc_constraint, 2e-4)
 
 
-def test_one_step(scene: Scene, result: Any) -> None:
+def test_one_step_matches_c_mujoco(scene: Scene, result: Any) -> None:
     for lane in range(LANES):
         data = _forward_in_c(scene, lane, advance=True)
         _close(result[2].qpos[:, lane], data.qpos, 1e-6)
@@ -242,7 +253,7 @@ def test_one_step(scene: Scene, result: Any) -> None:
 
 
 @pytest.mark.thorough("test_ground_parity.py compares all that both plants give of another body")
-def test_like_mjx(scene: Scene, result: Any) -> None:
+def test_one_step_matches_mjx(scene: Scene, result: Any) -> None:
     """MJX computes in float32 too: wider tolerances."""
     in_front = jax.tree.map(
         lambda x: jnp.moveaxis(x, -1, 0), (scene.state, scene.damping, scene.torque)
@@ -256,8 +267,8 @@ def test_like_mjx(scene: Scene, result: Any) -> None:
         _close(ours, theirs, 1e-3)
 
 
-def test_hundred_steps(scene: Scene, step: Everything) -> None:
-    """A drop on passive legs: through the impact together with C MuJoCo, to what float32 keeps of it."""
+def test_a_hundred_steps_match_c_mujoco(scene: Scene, step: Everything) -> None:
+    """A drop on passive legs, through the impact, within float32 accuracy."""
     state, still = scene.state, jnp.zeros_like(scene.torque)
     data = [mujoco.MjData(scene.model) for _ in range(LANES)]
     nominal = scene.model.geom_friction.copy()
@@ -275,8 +286,8 @@ def test_hundred_steps(scene: Scene, step: Everything) -> None:
     assert max(apart) < 5e-2
 
 
-def test_lanes_do_not_leak(scene: Scene, step: Everything, result: Any) -> None:
-    """A lane's result is the same bit for bit whatever its neighbours are, broken ones included."""
+def test_lanes_do_not_affect_each_other(scene: Scene, step: Everything, result: Any) -> None:
+    """A lane's result is bit for bit the same next to any lanes, broken ones included."""
     broken = jax.tree.map(lambda x: x.at[..., ::2].set(jnp.nan), scene.state)
     among_broken = step(broken, scene.damping, scene.torque)
     for ours, theirs in zip(jax.tree.leaves(result), jax.tree.leaves(among_broken), strict=True):

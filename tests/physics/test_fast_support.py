@@ -1,4 +1,4 @@
-"""Which models the fast physics refuses, and with which words."""
+"""Models that lane-major physics rejects, and its messages."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
 from mjxgait.physics.lane_major.lanes import sin_cos
 
@@ -43,7 +43,7 @@ def _model(
 
 
 def _plant(model: mujoco.MjModel) -> None:
-    fast_plant(model, SenseLayout(1, np.array([7]), np.array([6]), np.array([1])))
+    fast_plant(model, ObservationLayout(1, np.array([7]), np.array([6]), np.array([1])))
 
 
 def test_accepts_a_plain_creature() -> None:
@@ -82,12 +82,12 @@ def test_accepts_a_plain_creature() -> None:
         ({"more": '<equality><joint joint1="knee"/></equality>'}, "equality"),
     ],
 )
-def test_refuses(changes: dict[str, Any], words: str) -> None:
+def test_rejects_unsupported_models(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(UnsupportedModel, match=words):
         _plant(_model(**changes))
 
 
-def test_sine_and_cosine_in_every_quadrant():
+def test_sine_and_cosine_are_exact_in_every_quadrant():
     angle = np.linspace(-20.0, 20.0, 4001, dtype=np.float32)
     sine, cosine = sin_cos(jnp.asarray(angle))
     np.testing.assert_allclose(sine, np.sin(angle.astype(float)), atol=3e-7)

@@ -1,4 +1,4 @@
-"""Bodies that are welded to others cost nothing in the fast physics, and change nothing."""
+"""Fixed bodies merge into their parents in lane-major physics without changing the motion."""
 
 from typing import Any
 
@@ -45,7 +45,7 @@ WELDED = (
       <body name="thigh\"""",
     )
 )
-"""The body of many_bodies with a paw on an ankle on the shin, and a rotor and a sensor on the trunk."""
+"""The body of many_bodies with a paw on an ankle on the shin, a rotor and a sensor on the trunk."""
 MODELS = [varied(WELDED, seed) for seed in range(4)]
 
 
@@ -55,22 +55,22 @@ def plant() -> FastPlant:
 
 
 def close(ours: Any, theirs: Any, tolerance: float) -> None:
-    """Equal to a fraction of the largest entry."""
+    """Equal within a fraction of the largest entry."""
     most = tolerance * max(np.abs(theirs).max(initial=0), 1e-2)
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=most)
 
 
-def test_only_what_has_joints_is_a_body(plant: FastPlant):
+def test_only_bodies_with_joints_remain(plant: FastPlant):
     assert len(plant.topology.bodies) == MODELS[0].nbody - 1 - 4
     assert plant.topology.names == ("trunk", "thigh", "shin", "leg", "tail")
 
 
-def test_a_model_without_them_stays_as_it_is():
+def test_a_model_without_fixed_bodies_is_unchanged():
     model = mujoco.MjModel.from_xml_string(XML)
     assert not fast_plant(model, layout_of(model)).topology.welded
 
 
-def test_each_moves_as_in_c(plant: FastPlant):
+def test_merged_bodies_move_as_in_c_mujoco(plant: FastPlant):
     """Four bodies that differ in every number, in lanes of one program."""
     moment = moments(MODELS)
     numbers = stacked([plant.parameters_of(model, layout_of(model)) for model in MODELS])
@@ -91,11 +91,13 @@ def test_each_moves_as_in_c(plant: FastPlant):
     assert touching
 
 
-def test_what_is_welded_to_a_part_is_as_much_heavier(plant: FastPlant):
-    """The weight of a contact on a welded part is MuJoCo's to a hundredth."""
+def test_mass_scales_include_merged_bodies(plant: FastPlant):
+    """The weight of a contact on a merged body matches MuJoCo within 1 %."""
     model, factor = MODELS[1], np.linspace(0.6, 1.6, MODELS[1].nbody - 1)
     factor = factor[model.body_weldid[1:] - 1]
-    ours = jax.jit(plant.heavier)(plant.parameters_of(model, layout_of(model)), np.float32(factor))
+    ours = jax.jit(plant.with_mass_scale)(
+        plant.parameters_of(model, layout_of(model)), np.float32(factor)
+    )
     theirs = plant.parameters_of(heavier_model(model, factor), layout_of(model))
     for (path, a), b in zip(
         jax.tree_util.tree_leaves_with_path(ours), jax.tree.leaves(theirs), strict=True
@@ -105,8 +107,8 @@ def test_what_is_welded_to_a_part_is_as_much_heavier(plant: FastPlant):
         np.testing.assert_allclose(a, b, rtol=0, atol=most, err_msg=keystr(path))
 
 
-def test_bars_on_welded_parts_are_where_they_were():
-    """As deep in each other as they are in MuJoCo, which fuses nothing."""
+def test_bars_on_merged_bodies_keep_their_places():
+    """Overlaps match those of the unmerged MuJoCo model."""
     model = MODELS[0]
     ids = [model.body(name).id for name in ("paw", "rotor", "leg")]
     none = np.zeros(2)

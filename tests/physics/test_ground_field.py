@@ -1,7 +1,7 @@
-"""A drop onto rough ground in the fast physics, and in C MuJoCo onto the examiner's height field.
+"""A drop onto rough ground in lane-major physics, against C MuJoCo with a height field.
 
-Contacts differ: a foot meets several triangles of the field, and one plane here. The motion must
-not.
+Contacts differ: a foot meets several triangles of the field, but one plane in lane-major
+physics. The motion must agree.
 """
 
 import jax
@@ -21,11 +21,11 @@ from mjxgait.types import BodyState
 LANES = 8
 STEPS = 100
 DROP = 0.02
-"""m."""
+"""m, height of the drop."""
 
 
 def held(creature: Creature, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
-    """[nv, ...] torques towards the standing pose from states [nq, ...] and [nv, ...]."""
+    """Torques [nv, ...] towards the standing pose, from states [nq, ...] and [nv, ...]."""
     over = (slice(None), *(None,) * (qpos.ndim - 1))
     force = np.zeros(qvel.shape)
     away = creature.joints.stand[over] - qpos[creature.joints.qpos_adr]

@@ -1,7 +1,7 @@
-"""Both plants on other ground against C MuJoCo (float64), where each foot has a plane of its own.
+"""Both plants on uneven ground against C MuJoCo (float64), with one plane under each foot.
 
-The plane touches the ground where it is nearest to the foot, found by the examiner's heights. So
-contacts in C have the same place, axes and weight, and what is compared is the whole step.
+Each plane touches the ground at the point nearest to the foot, from the reference simulator's
+heights. So contacts in C have the same place, axes and weight, and whole steps can be compared.
 """
 
 import dataclasses
@@ -17,7 +17,7 @@ from physics.test_fast_parity import LANES, SLIM, _everything, _states
 
 from mjxgait.creature.ground.spec import Place, parse_ground
 from mjxgait.creature.ground.surface import lay_ground, named_draws
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.reference.layout import StartFrame
@@ -63,14 +63,15 @@ BALLS = f"""
     </body>
   </worldbody>
 </mujoco>"""
-"""A body that is small, for what differs from that of test_fast_parity.py is the ground."""
+"""A small body; what differs from test_fast_parity.py is the ground."""
 EXACT = {"slope:0.3:across": 1e-5, "rough:0.3@1": 1e-3}
-"""Accelerations of one step, over the largest. On rough ground the plants take two looks for the
-nearest point, which a plane needs no more than one of."""
+"""Tolerance for accelerations of one step, relative to the largest. On rough ground the plants
+search the nearest point in two iterations; a plane needs one.
+"""
 
 
 def own_planes() -> str:
-    """The same body; each foot meets a movable plane and nothing else."""
+    """The same body; each foot collides only with its own movable plane."""
 
     def plane(n: int) -> str:
         geom = FLOOR.replace("floor", f"plane_{n}").replace('contype="1"', f'contype="{2**n}"')
@@ -95,11 +96,11 @@ class Scene:
 
 @pytest.fixture(scope="module")
 def plants() -> SimpleNamespace:
-    """Both plants of the body on a floor, and the body in C on planes; compiled once per kind."""
+    """Both plants of the body on a floor, and the C model with planes; compiled once per kind."""
     model = mujoco.MjModel.from_xml_string(BALLS)
     hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
     watched = np.array([model.geom(name).id for name in (*FEET, "trunk", "tail")])
-    layout = SenseLayout(
+    layout = ObservationLayout(
         model.body("trunk").id, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], watched
     )
     return SimpleNamespace(
@@ -124,7 +125,7 @@ def scene(request: pytest.FixtureRequest, plants: SimpleNamespace) -> Scene:
     left = np.array([-FORWARD[1], FORWARD[0], 0.0])
     terrain = Terrain(spec, StartFrame(start, FORWARD, left), HIP, LENGTH)
     state = _states(plants.plane_model)
-    # Not so far that the height itself takes float32's digits.
+    # Near enough that float32 keeps the digits of the height.
     qpos = np.array(state.qpos)
     qpos[0] -= 70.0
     qpos[2] += terrain.height(qpos[0], qpos[1])
@@ -182,14 +183,14 @@ def apart(ours: np.ndarray, theirs: np.ndarray) -> float:
     return float(np.abs(ours - theirs).max() / max(np.abs(theirs).max(), 1e-2))
 
 
-def test_feet_are_on_the_ground_and_off_it(scene: Scene):
+def test_some_feet_touch_the_ground_and_some_do_not(scene: Scene):
     touching = [data.ncon for data in scene.in_c]
     assert 0 in touching
     assert max(touching) >= 2
 
 
 @pytest.mark.parametrize("plant", ["fast", "plain"])
-def test_a_step_is_that_of_c(scene: Scene, plant: str):
+def test_one_step_matches_c_mujoco(scene: Scene, plant: str):
     *_, after = getattr(scene, plant)
     for lane, data in enumerate(scene.in_c):
         assert apart(after.warmstart[:, lane], data.qacc) < scene.exact
@@ -197,15 +198,15 @@ def test_a_step_is_that_of_c(scene: Scene, plant: str):
         assert apart(after.qpos[:, lane], data.qpos) < 1e-6
 
 
-def test_both_plants_give_the_same(scene: Scene):
-    """What is sensed, the damped solution, and the next state; MJX computes in float32 too."""
+def test_both_plants_agree(scene: Scene):
+    """In sensed values, damped solution and next state; MJX computes in float32 too."""
     for ours, theirs in zip(*map(jax.tree.leaves, (scene.fast, scene.plain)), strict=True):
         assert apart(ours, theirs) < 1e-3
 
 
 @pytest.mark.parametrize("plant", ["fast", "plain"])
-def test_heights_are_told_above_the_ground(scene: Scene, plant: str):
-    """A ball's lowest point against the ground's nearest, the trunk's place straight down."""
+def test_heights_are_measured_above_the_ground(scene: Scene, plant: str):
+    """A sphere's lowest point from the nearest ground point; the trunk's height straight down."""
     sensed, *_ = getattr(scene, plant)
     for lane in range(LANES):
         x, y, _ = sensed.trunk_pos[:, lane]

@@ -1,4 +1,4 @@
-"""The depth of parts in each other is C MuJoCo's, for no neighbours, beyond the standing pose."""
+"""Overlap of parts matches C MuJoCo: without neighbours, and beyond the standing pose."""
 
 import dataclasses
 import itertools
@@ -23,23 +23,23 @@ from mjxgait.creature.overlap import (
     neighbours,
     pair_depths,
 )
-from mjxgait.physics.derived import sense_layout
+from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
 from mjxgait.tasks.base import DEEP, TOUCHING, Reason
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import fitness_terms
-from mjxgait.tasks.walk.stats import Judge, Tally
+from mjxgait.tasks.walk.stats import EpisodeStats, StatsRecorder
 from mjxgait.types import BodyState
 
 LANES = 6
 SLIM = {"xla_backend_optimization_level": 0}
-"""Compiling is what takes the time here."""
+"""Most of the time here is compilation."""
 
 
 def depth_in_c(creature: Creature, qpos: np.ndarray) -> float:
-    """m; the deepest of shapes on bodies that are not one nor parent and child, beyond standing."""
+    """Deepest overlap in m beyond the standing pose, without parent-child pairs."""
     model, data = creature.model, mujoco.MjData(creature.model)
 
     def depths(qpos: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ def depth_in_c(creature: Creature, qpos: np.ndarray) -> float:
 
 
 def crossed(creature: Creature, rng: np.random.Generator) -> np.ndarray:
-    """[nq] a pose in which the legs of one side cross, somewhere in the world."""
+    """A pose [nq] in which the legs of each side cross, anywhere in the world."""
     qpos = creature.stand_qpos.copy()
     qpos[:3] += rng.normal(size=3)
     turn = rng.normal(size=4)
@@ -92,8 +92,8 @@ def edited(tmp_path: Path, *changes: tuple[str, str]) -> Creature:
 
 
 @pytest.mark.parametrize("kinds", [("capsule", "capsule"), ("capsule", "sphere")])
-def test_distance_of_two_bars_is_that_of_c_mujoco(kinds: tuple[str, str]):
-    """Crossing, beside each other, end to end, far away, and parallel."""
+def test_the_distance_of_two_bars_matches_c_mujoco(kinds: tuple[str, str]):
+    """Bars that cross, lie side by side or end to end, are far apart, or are parallel."""
     geoms = "".join(
         f'<body mocap="true"><geom type="{kind}" size="0.05 {half}"/></body>'
         for kind, half in zip(kinds, (0.3, 0.2), strict=True)
@@ -118,8 +118,8 @@ def test_distance_of_two_bars_is_that_of_c_mujoco(kinds: tuple[str, str]):
 
 
 @pytest.mark.parametrize("make", [fast_plant, mjx_plant], ids=["fast", "mjx"])
-def test_both_plants_measure_what_c_mujoco_measures(make: Any, stool: Creature, poses: np.ndarray):
-    plant = make(stool.evolution_model, sense_layout(stool), find_crossings(stool))
+def test_both_plants_match_the_overlap_of_c_mujoco(make: Any, stool: Creature, poses: np.ndarray):
+    plant = make(stool.evolution_model, observation_layout(stool), find_crossings(stool))
     state = states(stool, poses)
     if plant.lane_axis:
         state = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), state)
@@ -131,13 +131,13 @@ def test_both_plants_measure_what_c_mujoco_measures(make: Any, stool: Creature, 
 
 
 def states(creature: Creature, poses: np.ndarray) -> BodyState:
-    """States at poses [L, nq], lanes in front."""
+    """States in poses [L, nq], lanes first."""
     still = jnp.zeros((len(poses), creature.model.nv))
     return BodyState(jnp.asarray(poses, jnp.float32), still, still, still, jnp.ones(len(poses)))
 
 
-def test_who_stands_in_himself_is_judged_by_what_comes_on_top(tmp_path: Path):
-    """Front feet that stand 1 cm in each other are not deep."""
+def test_overlap_in_the_standing_pose_is_allowed(tmp_path: Path):
+    """Front feet that overlap by 1 cm when standing do not count."""
     wide = edited(
         tmp_path,
         (
@@ -163,7 +163,7 @@ OTHERS = ("alien", "duck", "short_quadruped", "tall_quadruped")
 @pytest.mark.parametrize(
     "shipped", ["crab", "luxo", *(pytest.param(n, marks=MORE) for n in OTHERS)], indirect=True
 )
-def test_the_pairs_are_the_same_each_time_and_no_neighbours(shipped: Creature):
+def test_pairs_are_reproducible_and_exclude_neighbours(shipped: Creature):
     pairs, again = find_crossings(shipped), find_crossings(shipped)
     assert 0 < len(pairs.first) <= 256
     for field in dataclasses.fields(pairs):
@@ -175,7 +175,7 @@ def test_the_pairs_are_the_same_each_time_and_no_neighbours(shipped: Creature):
     assert (second != parent[first]).all()
 
 
-def test_the_crabs_claws_are_seen_by_its_front_legs():
+def test_the_crabs_claws_can_overlap_its_front_legs():
     from mjxgait.config.layers import find_creature
 
     crab = load_creature(find_creature("crab"))
@@ -200,7 +200,7 @@ CHAIN = """
 </body></worldbody></mujoco>"""
 
 
-def test_neighbours_are_joined_at_one_place():
+def test_neighbours_meet_at_one_joint():
     model = mujoco.MjModel.from_xml_string(CHAIN)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -226,8 +226,8 @@ def test_neighbours_are_joined_at_one_place():
         ('type="mesh" mesh="wedge"', 1),
     ],
 )
-def test_the_bars_of_a_shape_lie_inside_it_and_fill_it(shape: str, least: int):
-    """A grain on the surface of a bar is nowhere outside; they reach most of the shape's length."""
+def test_bars_lie_inside_their_shape_and_fill_it(shape: str, least: int):
+    """No point on a bar's surface is outside the shape; the bars span most of its length."""
     model = mujoco.MjModel.from_xml_string(f"""
     <mujoco><asset><mesh name="wedge"
         vertex="0 0 0 .3 0 0 .3 .1 0 0 .1 0 0 0 .1 0 .1 .1 .3 0 .02 .3 .1 .02"/></asset>
@@ -249,9 +249,9 @@ def test_the_bars_of_a_shape_lie_inside_it_and_fill_it(shape: str, least: int):
 
 
 @pytest.mark.parametrize("size", ["0.3 0.2 0.05", "0.04 0.3 0.05", "0.2 0.03 0.02"])
-def test_the_long_edges_of_a_box_are_hardly_bare(size: str):
-    """Round bars as thick as the box leave two fifths of its half thickness there, and a trunk's
-    sides are where legs hang.
+def test_bars_nearly_cover_the_long_edges_of_a_box(size: str):
+    """Round bars as thick as the box would leave two fifths of its half thickness uncovered at the
+    edges. Legs hang at the sides of a trunk.
     """
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><worldbody><body><geom type="box" size="{size}"/></body></worldbody></mujoco>'
@@ -269,14 +269,14 @@ def test_the_long_edges_of_a_box_are_hardly_bare(size: str):
         assert -1e-9 < min(bare) < 0.12 * half.min()
 
 
-def test_the_tally_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
-    """Not of a lane whose episode has ended, nor of one whose state is not a number."""
-    judge = Judge(stool, 0.005, 8)
+def test_statistics_keep_the_deepest_counted_overlap(stool: Creature):
+    """Lanes whose episode has ended, or whose state is not a number, do not count."""
+    evaluate = StatsRecorder(stool, 0.005, 8)
     steps = jnp.array([CHECK_EVERY, CHECK_EVERY, 100, CHECK_EVERY, CHECK_EVERY])
     reasons = [Reason.FINISHED, Reason.FINISHED, Reason.FINISHED, Reason.TIPPED, Reason.FINISHED]
-    tally = jax.tree.map(lambda leaf: jnp.stack([leaf] * 5), judge.init())
-    tally = dataclasses.replace(
-        tally,
+    stats = jax.tree.map(lambda leaf: jnp.stack([leaf] * 5), evaluate.init())
+    stats = dataclasses.replace(
+        stats,
         steps=steps,
         reason=jnp.array(reasons),
         overlap=jnp.array([0.0, 0.04, 0.0, 0.0, 0.01]),
@@ -286,21 +286,21 @@ def test_the_tally_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
         Any, SimpleNamespace(plant=SimpleNamespace(overlap=lambda _: depth), steps=100)
     )
     fields = dict.fromkeys(field.name for field in dataclasses.fields(Lane))
-    lane = cast(Any, Lane)(**(fields | {"tally": tally}))
-    found = Simulator._look_for_overlap(simulator, lane).tally
+    lane = cast(Any, Lane)(**(fields | {"stats": stats}))
+    found = Simulator._look_for_overlap(simulator, lane).stats
     np.testing.assert_allclose(found.overlap, [0.03, 0.04, 0.0, 0.0, 0.01])
 
 
-def term(creature: Creature, tally: Tally, forward: float) -> float:
+def term(creature: Creature, stats: EpisodeStats, forward: float) -> float:
     config = WalkConfig(speed=1.0)
-    tally = dataclasses.replace(
-        tally, forward=jnp.float32(forward * creature.frame.body_length), steps=jnp.int32(200)
+    stats = dataclasses.replace(
+        stats, forward=jnp.float32(forward * creature.frame.body_length), steps=jnp.int32(200)
     )
-    return float(fitness_terms(creature, config, 0.005, 200, tally)["overlap"])
+    return float(fitness_terms(creature, config, 0.005, 200, stats)["overlap"])
 
 
-def test_the_term_grows_with_depth_and_counts_as_far_as_there_is_a_walk(stool: Creature):
-    empty = Judge(stool, 0.005, 8).init()
+def test_the_overlap_term_grows_with_depth_and_distance_walked(stool: Creature):
+    empty = StatsRecorder(stool, 0.005, 8).init()
 
     def at(depth: float, forward: float = 1.0) -> float:
         metres = jnp.float32(depth * stool.frame.hip_height)
@@ -313,8 +313,8 @@ def test_the_term_grows_with_depth_and_counts_as_far_as_there_is_a_walk(stool: C
     assert at(0.5, forward=0.0) == 0.0
 
 
-def test_a_walker_whose_legs_cross_is_seen_and_nobody_else(stool: Creature):
-    """On fewer lanes than individuals, one whose legs meet among others that stand still."""
+def test_only_the_individual_with_crossing_legs_has_overlap(stool: Creature):
+    """Fewer lanes than individuals: one with crossing legs among others that stand still."""
     from mjxgait.training.experiment import build_experiment
 
     experiment = build_experiment(stool, small_config(rollout={"lanes": 3}))
@@ -331,7 +331,7 @@ def test_a_walker_whose_legs_cross_is_seen_and_nobody_else(stool: Creature):
         },
     )
     genomes = dataclasses.replace(genomes, key_poses=jnp.asarray(poses, jnp.float32))
-    # The same program as that of test_rollout.py.
-    depth = jax.jit(experiment.simulate)(genomes, experiment.starts).tally.overlap
+    # The same program as in test_rollout.py.
+    depth = jax.jit(experiment.simulate)(genomes, experiment.starts).stats.overlap
     assert (depth[2] > 0.001).all()
     assert (np.delete(np.asarray(depth), 2, axis=0) == 0).all()

@@ -1,4 +1,4 @@
-"""The fast physics in water, without gravity and floor, against C MuJoCo (float64)."""
+"""Lane-major physics in water, without gravity and floor, against C MuJoCo (float64)."""
 
 from types import SimpleNamespace
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from many_bodies import SLIM, XML
 
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.types import BodyState
 
@@ -24,7 +24,7 @@ def swimmer(density: float, viscosity: float) -> mujoco.MjModel:
 
 
 def states(model: mujoco.MjModel) -> tuple[BodyState, np.ndarray]:
-    """Tumbling fast enough that density counts, and torques."""
+    """Random torques, and states that tumble fast enough for density to matter."""
     rng = np.random.default_rng(1)
     qpos = np.tile(model.qpos0[:, None], LANES)
     qpos[3:7] = rng.normal(size=(4, LANES))
@@ -42,18 +42,18 @@ THICK = pytest.param((0.0, 3.0), marks=pytest.mark.thorough("the other fluid is 
 
 @pytest.fixture(scope="module", params=[(900.0, 0.3), THICK], ids=str)
 def swim(request: pytest.FixtureRequest) -> SimpleNamespace:
-    """One step and many of the fast plant, and the same in C."""
+    """One step and many steps of lane-major physics, and the same in C MuJoCo."""
     model = swimmer(*request.param)
     hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
     trunk = model.body("trunk").id
-    layout = SenseLayout(
+    layout = ObservationLayout(
         trunk, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], np.array([model.geom("leg").id])
     )
     plant, (state, torque) = fast_plant(model, layout), states(model)
 
     def step(state: BodyState, torque: jax.Array) -> tuple[jax.Array, BodyState]:
-        sensed, workings = plant.forward(state)
-        return sensed.bias, plant.advance(state, workings, torque)
+        sensed, step_data = plant.forward(state)
+        return sensed.bias, plant.advance(state, step_data, torque)
 
     compiled = jax.jit(step).lower(state, torque).compile(compiler_options=SLIM)
     bias, after = compiled(state, torque)
@@ -74,11 +74,11 @@ def in_c(swim: SimpleNamespace, lane: int, steps: int) -> mujoco.MjData:
 
 
 def close(ours: np.ndarray, theirs: np.ndarray, tolerance: float) -> None:
-    """To a share of the largest entry."""
+    """Equal within a share of the largest entry."""
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=tolerance * np.abs(theirs).max())
 
 
-def test_a_step_is_that_of_c(swim: SimpleNamespace):
+def test_one_step_matches_c_mujoco(swim: SimpleNamespace):
     for lane in range(LANES):
         data = in_c(swim, lane, 1)
         close(swim.bias[:, lane], data.qfrc_bias - data.qfrc_passive, 1e-5)
@@ -86,8 +86,8 @@ def test_a_step_is_that_of_c(swim: SimpleNamespace):
         close(swim.after.qvel[:, lane], data.qvel, 1e-5)
 
 
-def test_the_fluid_is_what_makes_the_difference(swim: SimpleNamespace):
-    """Each of its properties by a hundred times what the comparison of a step allows."""
+def test_density_and_viscosity_both_matter(swim: SimpleNamespace):
+    """Each property changes a step by a hundred times the tolerance of the comparison."""
     found, option = in_c(swim, 0, 1).qacc, swim.model.opt
     most = 2e-3 * np.abs(found).max()
     for density, viscosity in {(0.0, option.viscosity), (option.density, 0.0)}:
@@ -96,7 +96,7 @@ def test_the_fluid_is_what_makes_the_difference(swim: SimpleNamespace):
             assert np.abs(found - in_c(other, 0, 1).qacc).max() > most
 
 
-def test_a_swim_is_that_of_c(swim: SimpleNamespace):
+def test_a_swim_matches_c_mujoco(swim: SimpleNamespace):
     for lane in range(LANES):
         data = in_c(swim, lane, STEPS)
         close(swim.later.qpos[:, lane], data.qpos, 2e-3)

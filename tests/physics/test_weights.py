@@ -1,4 +1,4 @@
-"""What follows from a body's masses is MuJoCo's own reckoning, in both plants."""
+"""Quantities derived from masses match MuJoCo, in both plants."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +13,7 @@ from many_bodies import XML, layout_of, stacked, varied
 
 from mjxgait.creature import Creature
 from mjxgait.physics import heavier_model
-from mjxgait.physics.derived import sense_layout
+from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import Plant
@@ -31,9 +31,9 @@ def plant(request: pytest.FixtureRequest) -> Plant:
 
 
 @pytest.fixture(scope="module")
-def heavier(plant: Plant) -> Callable[..., Any]:
-    """The plant's, compiled once for all numbers."""
-    return jax.jit(plant.heavier)
+def with_mass_scale(plant: Plant) -> Callable[..., Any]:
+    """The plant's function, compiled once for all numbers."""
+    return jax.jit(plant.with_mass_scale)
 
 
 def assert_same(ours: Any, theirs: Any) -> None:
@@ -49,34 +49,36 @@ def factors(model: mujoco.MjModel, seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_heavier_bodies_are_those_of_mujoco(
-    plant: Plant, heavier: Callable[..., Any], model: mujoco.MjModel
+def test_scaled_masses_match_mujoco(
+    plant: Plant, with_mass_scale: Callable[..., Any], model: mujoco.MjModel
 ):
     factor, layout = factors(model, 5), layout_of(model)
-    ours = heavier(plant.parameters_of(model, layout), jnp.float32(factor))
+    ours = with_mass_scale(plant.parameters_of(model, layout), jnp.float32(factor))
     assert_same(ours, plant.parameters_of(heavier_model(model, factor), layout))
 
 
 @pytest.mark.parametrize("plant", ["fast", pytest.param("mjx", marks=SCALAR)], indirect=True)
-def test_one_factor_does_for_all_bodies(plant: Plant, heavier: Callable[..., Any]):
-    ours = heavier(plant.parameters, 1.3)
+def test_one_factor_scales_all_bodies(plant: Plant, with_mass_scale: Callable[..., Any]):
+    ours = with_mass_scale(plant.parameters, 1.3)
     model = heavier_model(MODELS[0], 1.3)
     assert_same(ours, plant.parameters_of(model, layout_of(model)))
 
 
-def test_a_body_per_lane(plant: Plant):
-    """Many factors at once are one `vmap`, the lanes where the plant has them."""
+def test_a_mass_scale_per_lane(plant: Plant):
+    """Many factors at once are one `vmap`, with the lanes where the plant has them."""
     rows = np.stack([factors(MODELS[0], seed) for seed in range(3)])
-    every = jax.jit(jax.vmap(lambda f: plant.heavier(plant.parameters, f)))(jnp.float32(rows))
+    every = jax.jit(jax.vmap(lambda f: plant.with_mass_scale(plant.parameters, f)))(
+        jnp.float32(rows)
+    )
     variants = [heavier_model(MODELS[0], row) for row in rows]
     assert_same(every, stacked([plant.parameters_of(m, layout_of(m)) for m in variants]))
 
 
-def test_the_weights_of_constraints_change(plant: Plant, heavier: Callable[..., Any]):
-    """Half the weight of all bodies is twice the inverse mass, but for rotors."""
+def test_constraint_weights_follow_the_masses(plant: Plant, with_mass_scale: Callable[..., Any]):
+    """Half the mass doubles the inverse mass, except for rotors."""
     half = jnp.float32(np.full(MODELS[0].nbody - 1, 0.5))
     before = plant.parameters_of(MODELS[0], layout_of(MODELS[0]))
-    after = heavier(before, half)
+    after = with_mass_scale(before, half)
     if plant.lane_axis:
         ratio = np.asarray(after.contacts.weight) / before.contacts.weight
     else:
@@ -89,9 +91,9 @@ MORE = [pytest.param(name, marks=pytest.mark.thorough("another body")) for name 
 
 
 @pytest.mark.parametrize("shipped", ["luxo", *MORE], indirect=True)
-def test_shipped_creatures(shipped: Creature):
-    model, layout = shipped.evolution_model, sense_layout(shipped)
+def test_shipped_creatures_scale_like_mujoco(shipped: Creature):
+    model, layout = shipped.evolution_model, observation_layout(shipped)
     factor = factors(model, 6)
     plant = fast_plant(model, layout)
-    ours = jax.jit(plant.heavier)(plant.parameters, jnp.float32(factor))
+    ours = jax.jit(plant.with_mass_scale)(plant.parameters, jnp.float32(factor))
     assert_same(ours, plant.parameters_of(heavier_model(model, factor), layout))

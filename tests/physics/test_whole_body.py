@@ -1,4 +1,4 @@
-"""Where no touch ends an episode the whole body meets the floor, in the fast physics too."""
+"""Where a touch does not end the episode, the whole body collides with the floor."""
 
 from pathlib import Path
 
@@ -15,12 +15,12 @@ from mjxgait.types import BodyState
 
 SECONDS = 1.0
 SLIM = {"xla_backend_optimization_level": 0}
-"""Compiling is what takes the time here."""
+"""Most of the time here is compilation."""
 
 
 @pytest.fixture(scope="module")
 def round_stool(tmp_path_factory: pytest.TempPathFactory) -> Creature:
-    """The stool with a capsule for a plate, since the fast physics knows no boxes, and bare legs."""
+    """The stool with a capsule as plate (lane-major physics has no boxes) and no leg contacts."""
     folder = tmp_path_factory.mktemp("round")
     for name in ("creature.toml", "creature.xml"):
         text = (STOOL / name).read_text()
@@ -42,14 +42,14 @@ def on_its_back(creature: Creature) -> BodyState:
 
 
 def lowest_after(creature: Creature, touch_ends: bool) -> float:
-    """m; the lowest part of the limp creature a second after it was put on its back."""
+    """Height in m of the lowest part, one second after the limp creature is put on its back."""
     plant, _ = make_plant(creature, "auto", touch_ends)
     assert isinstance(plant, FastPlant)
     limp = jnp.zeros((creature.model.nv, 1), jnp.float32)
 
     def step(state: BodyState) -> tuple[jax.Array, BodyState]:
-        sensed, workings = plant.forward(state)
-        return jnp.min(sensed.geom_low), plant.advance(state, workings, limp)
+        sensed, step_data = plant.forward(state)
+        return jnp.min(sensed.geom_low), plant.advance(state, step_data, limp)
 
     state = on_its_back(creature)
     program = jax.jit(step).lower(state).compile(compiler_options=SLIM)
@@ -62,8 +62,8 @@ def test_a_creature_on_its_back_rests_on_the_floor(round_stool: Creature):
     assert lowest_after(round_stool, touch_ends=False) > -0.01
 
 
-def test_where_a_touch_ends_the_episode_only_feet_meet_the_floor(round_stool: Creature):
-    """Contacts cost time, and nobody sees what happens after the end."""
+def test_only_feet_have_contacts_where_a_touch_ends_the_episode(round_stool: Creature):
+    """Contacts cost time, and after the end the motion does not matter."""
     feet, whole = (
         len(make_plant(round_stool, "auto", touch_ends)[0].structure.contacts)
         for touch_ends in (True, False)

@@ -13,7 +13,7 @@ import numpy as np
 
 from mjxgait.animation.keys.bring import Brought
 from mjxgait.animation.keys.cycle import interpolated
-from mjxgait.certification import criteria_of, judged, read_certificate
+from mjxgait.certification import criteria_of, read_certificate, verdict_of
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import Table, build, merge
 from mjxgait.creature import Creature
@@ -311,7 +311,7 @@ def look(run: Path) -> Kept:
         kept_by(run),
         departure(read_original(run, walk.creature), walk).poses,
         float(np.nan_to_num(found[STARTS].measures[0].value)),
-        judged(document).certified,
+        verdict_of(document).certified,
         walk,
     )
 

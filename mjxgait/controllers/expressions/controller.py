@@ -186,7 +186,7 @@ _GIVES: dict[str, Callable[[jax.Array, jax.Array, jax.Array], jax.Array]] = {
 
 
 class Programs:
-    """See `Controller`: an expression's value is its joint's target angle in rad.
+    """Implementation of `Controller`: an expression's value is its joint's target angle in rad.
 
     settings: those that shape the program. added: names of the observations that the task adds.
     """
@@ -195,7 +195,7 @@ class Programs:
     command: ClassVar[Command] = "pose"
 
     @classmethod
-    def told(
+    def with_settings(
         cls, creature: Body, step: float, settings: ProgramConfig, added: Sequence[str]
     ) -> "Programs":
         """Return the controller of a body. added: names of the observations that the task adds."""
@@ -217,18 +217,18 @@ class Programs:
         self.reads = tuple(dict.fromkeys(terminal.sense for terminal in self.known))
 
     def variation(self, settings: ProgramConfig, evolution: EvolutionConfig) -> Variation:
-        """See `Controller`; the first generation begins with the programs of the settings."""
+        """The first generation begins with the programs of the settings."""
         given = programs_to_begin_with(self.creature, settings, self.added)
         first = None if given is None else Trees(*map(jnp.asarray, given))
         return program_variation(self.words, len(self.creature.joints.names), settings, first)
 
     def genes(self, genomes: Trees, settings: ProgramConfig) -> np.ndarray:
-        """See `Controller`: nodes either match or differ."""
+        """Nodes either match or differ."""
         code, value = (np.asarray(leaf) for leaf in (genomes.code, genomes.value))
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in (code, value)], axis=1)
 
     def numbers(self, genomes: Trees) -> Mapping[str, np.ndarray]:
-        """See `Controller`: the nodes of all expressions."""
+        """The nodes of all expressions."""
         return {"nodes": (np.asarray(genomes.code) != EMPTY).sum(axis=(1, 2))}
 
     def prepare(self, genome: Trees, settings: ProgramConfig) -> Listing:
@@ -236,15 +236,15 @@ class Programs:
         return listed(genome, self.words)
 
     def load(self, plan: Listing) -> jax.Array:
-        """See `Controller`: the number of functions in the longest expression."""
+        """The number of functions in the longest expression."""
         return jnp.max(plan.count)
 
     def init(self) -> tuple[()]:
-        """See `Controller`: a program has no memory."""
+        """A program has no memory."""
         return ()
 
     def act(self, plan: Listing, memory: tuple[()], senses: Senses) -> tuple[jax.Array, tuple[()]]:
-        """See `Controller`: clipped to each joint's pose range."""
+        """Target angles, clipped to each joint's pose range."""
         seen = [
             senses[t.sense] if t.index is None else senses[t.sense][t.index] for t in self.known
         ]

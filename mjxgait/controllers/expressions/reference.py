@@ -96,7 +96,7 @@ def value_of(expression: Expression, senses: Mapping[str, np.ndarray]) -> np.nda
 
 
 class ExpressionReference:
-    """See `ReferenceController`. Its memory holds only the number of simulations."""
+    """Implementation of `ReferenceController`. Its memory holds only the number of simulations."""
 
     command: ClassVar[Command] = "pose"
 
@@ -123,5 +123,5 @@ class ExpressionReference:
         ), memory
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `ReferenceController`: it has no cycle."""
+        """Return NaN: there is no cycle."""
         return np.full(len(memory["still"]), np.nan)

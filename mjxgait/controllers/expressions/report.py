@@ -30,7 +30,7 @@ class ProgramView(GenomeView):
         }
 
     def spread(self, snapshot: Snapshot) -> dict[str, object]:
-        """See `GenomeView`: nodes per expression, over the population."""
+        """Nodes per expression, over the population."""
         nodes = _nodes(snapshot)
         return {"nodes": {"mean": nodes.mean(0).tolist(), "most": nodes.max(0).tolist()}}
 

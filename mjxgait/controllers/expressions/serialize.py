@@ -35,7 +35,7 @@ class ExpressionSerializer(PlainSerializer[ProgramConfig]):
     def document(
         self, genome: Mapping[str, np.ndarray], settings: ProgramConfig, creature: Creature
     ) -> dict[str, object]:
-        """See `Serializer`. expressions: by joint. nodes: most per expression."""
+        """Implementation of `Serializer`. expressions: by joint. nodes: most per expression."""
         known = terminals(creature, tuple(ADDED.values()))
         rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
         return {
@@ -46,7 +46,7 @@ class ExpressionSerializer(PlainSerializer[ProgramConfig]):
     def settled(
         self, genome: Mapping[str, np.ndarray], creature: Creature
     ) -> dict[str, np.ndarray]:
-        """See `Serializer`: simplified, then written as text and read back."""
+        """Simplified, then written as text and read back."""
         known, nodes = terminals(creature, tuple(ADDED.values())), genome["code"].shape[1]
         pairs = zip(genome["code"], genome["value"], strict=True)
         rows = []

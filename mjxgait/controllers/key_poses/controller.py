@@ -115,7 +115,7 @@ class PoseTracker:
         return jnp.clip(given, low, high)
 
     def variation(self, settings: PoseConfig, evolution: EvolutionConfig) -> Variation:
-        """See `Controller`; the first created genome has the key poses of `settings.around`."""
+        """The first created genome has the key poses of `settings.around`."""
         usual = pose_variation(Box(*self.bounds(settings)), evolution)
         if not settings.around:
             return usual
@@ -132,7 +132,7 @@ class PoseTracker:
         return in_ranges(genomes, Box(*self.bounds(settings)))
 
     def numbers(self, genomes: Genome) -> Mapping[str, np.ndarray]:
-        """See `Controller`: none."""
+        """Report no quantities."""
         return {}
 
     def prepare(self, genome: Genome, config: PoseConfig) -> PoseCycle:
@@ -149,7 +149,7 @@ class PoseTracker:
         )
 
     def load(self, plan: PoseCycle) -> None:
-        """See `Controller`: the same for all."""
+        """Equal for all individuals."""
 
     def init(self) -> GaitState:
         """Return the state at the start of an episode."""
@@ -277,12 +277,12 @@ def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
     pitch = _clip(hold * senses["pitch"] + hold_rate * senses["pitch_rate"])
     roll = _clip(sway * senses["roll"] + sway_rate * senses["roll_rate"])
     yaw = _clip(turn * off_the_way(creature, senses))
-    asked = (
+    wanted = (
         (swing * ahead - stance * pitch, weights.ahead),
         (swing * aside + stance * roll, weights.aside),
         ((stance - swing) * yaw, weights.turn),
     )
-    by_joint = ((jnp.stack([feet[leg] for leg in weights.legs]), by) for feet, by in asked)
+    by_joint = ((jnp.stack([feet[leg] for leg in weights.legs]), by) for feet, by in wanted)
     return sum((of * by.astype(np.float32) for of, by in by_joint), start=jnp.zeros(()))
 
 

@@ -33,7 +33,7 @@ class PoseView(GenomeView):
         }
 
     def spread(self, snapshot: Snapshot) -> dict[str, object]:
-        """See `GenomeView`: the mean over the key poses, per joint."""
+        """The mean over the key poses, per joint."""
         poses, tuning = snapshot.genomes["key_poses"], snapshot.genomes["tuning"]
         spread = np.degrees(poses.std(axis=0).mean(axis=0))
         room = np.degrees(snapshot.creature.joints.pose_high - snapshot.creature.joints.pose_low)
@@ -44,7 +44,7 @@ class PoseView(GenomeView):
         }
 
     def difference(self, a: Snapshot, b: Snapshot) -> dict[str, object]:
-        """See `GenomeView`: key poses are compared only if the joints are the same."""
+        """Key poses are compared only if the joints are the same."""
         mine, other = a.genomes, b.genomes
         comparable = (
             a.creature.joints.names == b.creature.joints.names

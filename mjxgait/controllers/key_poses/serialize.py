@@ -24,7 +24,10 @@ class PoseSerializer(PlainSerializer[PoseConfig]):
     def document(
         self, genome: Mapping[str, np.ndarray], settings: PoseConfig, creature: Creature
     ) -> dict[str, object]:
-        """See `Serializer`. mirrored: whether the cycle includes the mirror images of the poses."""
+        """Implementation of `Serializer`.
+
+        mirrored: whether the cycle includes the mirror images of the poses.
+        """
         names = gene_names(creature.corrections.steps)
         return {
             "key_poses": [

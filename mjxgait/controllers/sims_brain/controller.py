@@ -28,14 +28,17 @@ def capacity_of(settings: BrainConfig) -> Capacity:
 
 
 class Brains:
-    """See `Controller`: a command holds the torques of all hinges that a body may have."""
+    """Implementation of `Controller`.
+
+    A command holds the torques of all hinges that a body may have.
+    """
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
     grows: ClassVar[bool] = True
 
     @classmethod
-    def told(
+    def with_settings(
         cls, creature: Body, step: float, settings: BrainConfig, added: Sequence[str]
     ) -> "Brains":
         """Return the controller. added: names of the observations that the task adds."""
@@ -48,7 +51,7 @@ class Brains:
         self.reads = ("joint_pos", "contact", *([LIGHT] if LIGHT in added else []))
 
     def variation(self, settings: BrainConfig, evolution: EvolutionConfig) -> Variation:
-        """See `Controller`: offspring are crossed, grafted, or have one parent."""
+        """Offspring are crossed, grafted, or have one parent."""
         rates = Rates(
             settings.values, settings.sigma, settings.connect, settings.grow, settings.strength
         )
@@ -84,12 +87,12 @@ class Brains:
         return Variation(create, cross, mutate)
 
     def genes(self, genomes: Genotype, settings: BrainConfig) -> np.ndarray:
-        """See `Controller`: kinds and flags either match or differ."""
+        """Kinds and flags either match or differ."""
         leaves = [np.asarray(leaf, float) for leaf in jax.tree.leaves(genomes)]
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
     def numbers(self, genomes: Genotype) -> Mapping[str, np.ndarray]:
-        """See `Controller`: the number of parts, without tracing code that no program needs."""
+        """The number of parts, without tracing code that no program needs."""
         names = [field.name for field in dataclasses.fields(genomes.graph)]
         graph = {f"graph.{name}": np.asarray(getattr(genomes.graph, name)) for name in names}
         counts = [
@@ -99,19 +102,19 @@ class Brains:
         return {"parts": np.array(counts)}
 
     def prepare(self, genome: Genotype, settings: BrainConfig) -> Brain:
-        """See `Controller`: the wiring of the body that grows from the genome."""
+        """The wiring of the body that grows from the genome."""
         body = body_of(genome.graph, self.capacity)
         return wired(genome.nerves, genome.centre, body, self.room)
 
     def load(self, plan: Brain) -> None:
-        """See `Controller`: the same for all."""
+        """Equal for all individuals."""
 
     def init(self) -> Mind:
         """See `Controller`."""
         return blank(self.capacity.parts * self.room.local + self.room.central)
 
     def act(self, plan: Brain, memory: Mind, senses: Senses) -> tuple[jax.Array, Mind]:
-        """See `Controller`: N·m of the links' hinges, without the root."""
+        """Torques in N·m of the links' hinges, without the root."""
         links = self.capacity.links
         light = senses[LIGHT] if LIGHT in self.reads else jnp.zeros((links, 3))
         angles = jnp.concatenate([jnp.zeros(1), senses["joint_pos"]])

@@ -85,7 +85,7 @@ def fire(kind: str, inputs: Sequence[Values], memory: Values, dt: float) -> tupl
 
 
 class BrainReference:
-    """See `ReferenceController`.
+    """Implementation of `ReferenceController`.
 
     genome: its arrays by name. parts: grown from it. hinges: part and hinge index of each joint of
     the model. step: s of the simulation. every: steps per command.
@@ -146,7 +146,7 @@ class BrainReference:
         return torque, {"values": values, "memory": kept}
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `ReferenceController`: it has no cycle."""
+        """Return NaN: there is no cycle."""
         return np.full(len(memory["values"]), np.nan)
 
     def _sensed(self, senses: Mapping[str, np.ndarray]) -> np.ndarray:

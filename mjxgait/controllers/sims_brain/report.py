@@ -18,16 +18,16 @@ class GraphView(GenomeView):
     """Grown parts; see `GenomeView`."""
 
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, object]:
-        """See `GenomeView`. size: m. swing: deg to either side. strength: N·m."""
+        """Implementation of `GenomeView`. size: m. swing: deg to either side. strength: N·m."""
         return {"parts": [_part(part) for part in _grown(snapshot, i)]}
 
     def spread(self, snapshot: Snapshot) -> dict[str, object]:
-        """See `GenomeView`: the number of parts, over the population."""
+        """The number of parts, over the population."""
         counts = [len(_grown(snapshot, i)) for i in range(len(snapshot.genomes["graph.half"]))]
         return {"parts": {"mean": float(np.mean(counts)), "most": max(counts)}}
 
     def difference(self, a: Snapshot, b: Snapshot) -> dict[str, object]:
-        """See `GenomeView`: both champions' parts."""
+        """Both champions' parts."""
         alike = all(
             name in b.genomes and array.shape[1:] == b.genomes[name].shape[1:]
             for name, array in a.genomes.items()

@@ -18,12 +18,12 @@ from mjxgait.kinds import in_water
 
 
 class GraphSerializer(Serializer[BrainConfig]):
-    """See `Serializer`: arrays as nested lists under their names."""
+    """Implementation of `Serializer`: arrays as nested lists under their names."""
 
     def settled(
         self, genome: Mapping[str, np.ndarray], creature: Creature
     ) -> dict[str, np.ndarray]:
-        """See `Serializer`: numbers as stored in a file, so that the same body grows from it."""
+        """Numbers as stored in a file, so that the same body grows from it."""
         return {
             name: array.astype(float) if np.issubdtype(array.dtype, np.floating) else array
             for name, array in genome.items()
@@ -64,7 +64,7 @@ class GraphSerializer(Serializer[BrainConfig]):
         task: str,
         creature: Creature,
     ) -> Creature:
-        """See `Serializer`: the grown body, in the water or on the ground of its task."""
+        """The grown body, in the water or on the ground of its task."""
         wet = in_water(task)
         files = body_files(
             grow(genome, settings.parts, settings.links),

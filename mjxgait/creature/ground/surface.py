@@ -57,7 +57,7 @@ class Slope(Relief):
     across: jax.Array
 
     def rise(self, ahead: jax.Array, left: jax.Array, level: jax.Array) -> Vector:
-        """See `Relief`; a slope along the way begins as a parabola a `level` long."""
+        """A slope along the way begins as a parabola a `level` long."""
         beyond = ahead - level
         bend = jnp.clip(beyond, 0.0, level)
         height = self.along * (0.5 * bend * bend / level + jnp.maximum(beyond - level, 0.0))

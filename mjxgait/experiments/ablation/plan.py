@@ -25,7 +25,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature.ground.spec import FLAT
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.plugins import resolve_config
-from mjxgait.tasks.walk.targets import Wishes, wished
+from mjxgait.tasks.walk.targets import WalkTargets, with_targets
 from mjxgait.training.folder import check_parts
 
 Measure = Literal["walk", "up", "certified", "fitness", "area", "generations"]
@@ -221,7 +221,7 @@ def _config(study: Study, table: VariantTable, creature: Creature, where: str) -
     if study.physics is not None:
         config = _lay(config, {"rollout": {"physics": study.physics}}, where)
     with _told_of(here):
-        config = wished(config, creature, Wishes(gait=table.gait))
+        config = with_targets(config, creature, WalkTargets(gait=table.gait))
     return _settled(config, table.generations or study.generations)
 
 

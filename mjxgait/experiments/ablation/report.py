@@ -145,8 +145,8 @@ def _table(plan: Plan, results: Sequence[Result], findings: Sequence[Finding]) -
             ]
         else:
             cells += ["-"] * 4
-        judged = [r.certified for r in mine if r.certified is not None]
-        certified = _estimate(share(sum(judged), len(judged))) if judged else "-"
+        evaluation = [r.certified for r in mine if r.certified is not None]
+        certified = _estimate(share(sum(evaluation), len(evaluation))) if evaluation else "-"
         cells += [
             f"{np.mean([r.up for r in mine]):.0%}",
             certified,

@@ -6,7 +6,6 @@ C MuJoCo evaluates all variants alike, whatever fitness they evolved for.
 import contextlib
 import dataclasses
 import functools
-import json
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -34,6 +33,7 @@ from mjxgait.training.folder import (
     CREATURE,
     METRICS,
     Line,
+    append_lines,
     read_metrics,
     read_records,
     truncate_metrics,
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from jax.tree_util import PyTreeDef
 
 GROUPS, CHAMPIONS = "groups", "champions"
+TIMES = ("wall_s", "steps_per_second")
+"""Metrics that the log of a study leaves out."""
 
 
 class News(TypedDict, total=False):
@@ -195,15 +197,18 @@ class _Group:
 
         Wall time is left out: the rows share it, and it is never the same twice.
         """
-        with disk_errors(self.folder), (self.folder / METRICS).open("a", encoding="utf-8") as log:
-            for run, line in zip(self.runs, lines, strict=True):
-                if line["generation"] <= run.generations:
-                    kept = {
-                        key: value
-                        for key, value in line.items()
-                        if key not in ("wall_s", "steps_per_second")
-                    }
-                    log.write(json.dumps({"variant": run.variant, "seed": run.seed, **kept}) + "\n")
+        append_lines(
+            self.folder / METRICS,
+            (
+                {"variant": run.variant, "seed": run.seed, **_without(line, TIMES)}
+                for run, line in zip(self.runs, lines, strict=True)
+                if line["generation"] <= run.generations
+            ),
+        )
+
+
+def _without(line: Line, names: Sequence[str]) -> Line:
+    return {name: value for name, value in line.items() if name not in names}
 
 
 MEASURED = "measured.jsonl"
@@ -216,7 +221,7 @@ The starts are perturbed as in the certificate, and unseen in evolution.
 
 Ways = dict[str, tuple[float, float]]
 """A champion's `walk` and `up` on each ground."""
-Judged = tuple[Ways, bool | None]
+Evaluation = tuple[Ways, bool | None]
 """A champion's `Ways` and the `certified` of its `Result`."""
 
 
@@ -286,15 +291,14 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
     again = f"mjxgait ablate --resume {folder}"
     with survivable(folder, again), process_per_core(len(missing), prepare) as pool:
         found = pool.map(
-            partial(_judge, folder / CREATURE, plan.study.grounds, plan.study.certify),
+            partial(_evaluate, folder / CREATURE, plan.study.grounds, plan.study.certify),
             [champion_path(folder, plan, run) for run in missing],
-            [_found_somebody(lines[run.variant, run.seed]) for run in missing],
+            [_has_finite_best(lines[run.variant, run.seed]) for run in missing],
         )
-        for number, (run, judged) in enumerate(zip(missing, found, strict=True), 1):
-            result = _result(plan.study, run, lines[run.variant, run.seed], judged)
+        for number, (run, evaluation) in enumerate(zip(missing, found, strict=True), 1):
+            result = _result(plan.study, run, lines[run.variant, run.seed], evaluation)
             known[result.variant, result.seed] = result
-            with disk_errors(folder), (folder / MEASURED).open("a", encoding="utf-8") as log:
-                log.write(json.dumps(dataclasses.asdict(result)) + "\n")
+            append_lines(folder / MEASURED, [dataclasses.asdict(result)])
             tell(number, len(missing))
     return [known[run.variant, run.seed] for run in plan.runs]
 
@@ -303,11 +307,11 @@ def _measured(folder: Path) -> list[Line]:
     return read_records(folder / MEASURED, Result)
 
 
-def _result(study: Study, run: Run, lines: Sequence[Line], judged: Judged) -> Result:
-    ways, certified = judged
+def _result(study: Study, run: Run, lines: Sequence[Line], evaluation: Evaluation) -> Result:
+    ways, certified = evaluation
     walk, up = ways[study.grounds[0]]
     best = [-math.inf if line["best"] is None else line["best"] for line in lines]
-    finite, threshold = _found_somebody(lines), study.threshold
+    finite, threshold = _has_finite_best(lines), study.threshold
     reached = [i for i, value in enumerate(best) if threshold is not None and value >= threshold]
     return Result(
         variant=run.variant,
@@ -324,14 +328,14 @@ def _result(study: Study, run: Run, lines: Sequence[Line], judged: Judged) -> Re
     )
 
 
-def _found_somebody(lines: Sequence[Line]) -> bool:
+def _has_finite_best(lines: Sequence[Line]) -> bool:
     """Return whether the best fitness at the end is finite."""
     return lines[-1]["best"] is not None
 
 
-def _judge(
+def _evaluate(
     creature_folder: Path, grounds: Sequence[str], examine: bool, path: Path, finite: bool
-) -> Judged:
+) -> Evaluation:
     """Evaluate the champion at `path` on each ground; if `examine`, also certify it on the first.
 
     Runs in its own process. The arguments are small: the pool of Python 3.11 hangs if a process is

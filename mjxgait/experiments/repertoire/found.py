@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from rich.table import Table
 
-from mjxgait.certification import judged, read_certificate
+from mjxgait.certification import read_certificate, verdict_of
 from mjxgait.certification.verdict import Document
 from mjxgait.experiments.repertoire.grid import Cell, Grid
 from mjxgait.rendering.curves import DARK, MIDDLE, PALE
@@ -102,7 +102,7 @@ def _field(axes: Axes, one: Found, x: float, y: float) -> None:
 def _found(cell: Cell, document: Document | None) -> Found:
     if document is None:
         return Found(cell, False, None, None, None, "", None, ())
-    report, verdict = document.get("report", {}), judged(document)
+    report, verdict = document.get("report", {}), verdict_of(document)
     measures = [m for c in document["criteria"] for m in c["measures"]]
     off = [m["value"] for m in measures if m["name"].startswith("off the heading")]
     duty = [share for share in report.get("duty_factor", {}).values() if share is not None]

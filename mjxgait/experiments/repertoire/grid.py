@@ -19,7 +19,7 @@ from mjxgait.distributed.jobs import Advanced
 from mjxgait.distributed.rows import Rows
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
-from mjxgait.tasks.walk.targets import Wishes, wished
+from mjxgait.tasks.walk.targets import WalkTargets, with_targets
 from mjxgait.training.checkpoint import Packed
 
 GRID = "repertoire.toml"
@@ -133,7 +133,9 @@ def check(config: Config) -> None:
         )
     if config.evolution.body != 1:
         raise UserError("evolution.body: the clips of a repertoire are of one body; leave it at 1")
-    if config.fitness.wish.asked and {"speed", "turn", "steer"} & set(config.fitness.wish.asked):
+    if config.fitness.wish.requested and {"speed", "turn", "steer"} & set(
+        config.fitness.wish.requested
+    ):
         raise UserError("fitness.wish: the grid asks for speeds and turns; leave these out")
 
 
@@ -149,9 +151,9 @@ def settings_of(cell: Cell, grid: Grid, creature: Creature, base: Config) -> Con
     cells begin with the straight populations.
     """
     speed = f"{cell.speed:.6f}"
-    config = wished(base, creature, Wishes(speed=speed, turn=cell.turn or None))
+    config = with_targets(base, creature, WalkTargets(speed=speed, turn=cell.turn or None))
     if grid.turns:
-        turning = wished(base, creature, Wishes(speed=speed, turn=grid.turns[-1]))
+        turning = with_targets(base, creature, WalkTargets(speed=speed, turn=grid.turns[-1]))
         config = dataclasses.replace(config, controller=turning.controller)
     forced = dataclasses.replace(config.evolution.forced, patience=0)
     # The rows of a program advance together: none may stop early.

@@ -102,8 +102,8 @@ def _blended(folder: Path, pair: Pair) -> Blend:
     """Test a pair in its own process, which receives only the walks' place."""
     (creature, one), (_, other) = (open_champion(folder / cell.name) for cell in pair)
     seen = nominal_check(creature, half_way(one, other, creature))
-    judged = [criterion for criterion in seen.criteria if criterion.number in WALKS]
-    return Blend(pair, tuple(criterion.name for criterion in judged if not criterion.passed))
+    evaluation = [criterion for criterion in seen.criteria if criterion.number in WALKS]
+    return Blend(pair, tuple(criterion.name for criterion in evaluation if not criterion.passed))
 
 
 def half_way(one: Champion, other: Champion, creature: Creature) -> Champion:
@@ -185,7 +185,7 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
     step = float(creature.model.opt.timestep)
     moments = WARMUP + np.arange(MOMENTS) / MOMENTS
     steps = round((moments[-1] + SECONDS + SETTLES + WATCHED) / step)
-    told = told_headings(before, after, moments, steps, step)
+    told = commanded_headings(before, after, moments, steps, step)
     twin = ChangingReference(creature, before, after, step, moments, SECONDS)
     outcome = simulate(
         creature,
@@ -200,7 +200,7 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
     return outcome.stayed_up & _as_told(creature, outcome, float(after.wish["speed"]))
 
 
-def told_headings(
+def commanded_headings(
     before: Champion, after: Champion, moments: np.ndarray, steps: int, step: float
 ) -> np.ndarray | None:
     """Return headings [S, T] rad: turning as one walk, then as the other; None if neither turns."""

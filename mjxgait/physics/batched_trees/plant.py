@@ -24,6 +24,7 @@ from mjxgait.physics.batched_trees.dynamics import (
 from mjxgait.physics.batched_trees.tree import (
     FAR,
     Dense,
+    ModularSensed,
     Surroundings,
     Tree,
     centres,
@@ -214,11 +215,11 @@ class TreePlant(Plant[Moment]):
         return one_kernel(self._forward)(state)
 
     @override
-    def solve_damped(self, workings: Moment, damping: jax.Array, force: jax.Array) -> jax.Array:
-        return jnp.stack(one_kernel(_solve_damped)(workings.mass, damping, force))
+    def solve_damped(self, step_data: Moment, damping: jax.Array, force: jax.Array) -> jax.Array:
+        return jnp.stack(one_kernel(_solve_damped)(step_data.mass, damping, force))
 
     def overlap(self, state: BodyState) -> jax.Array:
-        """See `Plant.overlap`; any pose counts, because these bodies have no drawn pose."""
+        """Any pose counts, because these bodies have no drawn pose."""
         tree: Tree = state.parameters
         return deepest(tree, posture(tree, state.qpos, pinned_by(state.friction)))
 
@@ -231,8 +232,8 @@ class TreePlant(Plant[Moment]):
         return qpos.at[2].add(-jnp.min(lows(lane, poses)))
 
     @override
-    def advance(self, state: BodyState, workings: Moment, torque: jax.Array) -> BodyState:
-        after = one_kernel(self._advance)(state, workings, torque)
+    def advance(self, state: BodyState, step_data: Moment, torque: jax.Array) -> BodyState:
+        after = one_kernel(self._advance)(state, step_data, torque)
         return dataclasses.replace(after, parameters=state.parameters)
 
     def _forward(self, state: BodyState) -> tuple[Sensed, Moment]:
@@ -257,19 +258,42 @@ class TreePlant(Plant[Moment]):
             bias=pin(bias + resisted),
             touch=pin(lowest_corners(tree, poses)) if around.floor else None,
         )
-        sensed = dataclasses.replace(
-            _sensed(tree, state, poses, moving, moment.bias),
-            momentum=jnp.stack([jnp.sum(x, axis=0) for x in body.times(unpack(moving)).shift]),
-            washed=jnp.sum(washed[:, 3:], axis=0),
+        momentum = jnp.stack([jnp.sum(x, axis=0) for x in body.times(unpack(moving)).shift])
+        return self._sensed(state, poses, moving, moment.bias, momentum, washed), moment
+
+    def _sensed(
+        self,
+        state: BodyState,
+        poses: Sequence[Pose],
+        moving: jax.Array,
+        bias: jax.Array,
+        momentum: jax.Array,
+        washed: jax.Array,
+    ) -> Sensed:
+        """Sense the root as trunk and every block as watched; missing blocks are far up."""
+        tree: Tree = state.parameters
+        centre = [c + state.qpos[i] for i, c in enumerate(centres(tree, poses))]
+        weight, low = tree.mass / jnp.sum(tree.mass, axis=0), lows(tree, poses)
+        own = ModularSensed(
+            com=jnp.stack([jnp.sum(weight * c, axis=0) for c in centre]),
+            momentum=momentum,
+            water_force=jnp.sum(washed[:, 3:], axis=0),
+            limit_excess=jnp.max(jnp.abs(state.qpos[7:]) - tree.high[1:], axis=0),
+            depth=jnp.max(-low / sizes(tree), axis=0),
+            geom_rot=_block_axes(tree, poses) if self.around.lit else None,
         )
-        if around.lit:
-            rot = frames(poses)
-            own = [jnp.stack(turn_each(rot, tree.axes[:, k]), axis=1) for k in range(3)]
-            sensed = dataclasses.replace(sensed, geom_rot=jnp.stack(own, axis=1))
-        if not around.floor:
-            nowhere = jnp.full_like(sensed.geom_low, FAR)
-            sensed = dataclasses.replace(sensed, geom_low=nowhere)
-        return sensed, moment
+        return Sensed(
+            joint_pos=state.qpos[7:],
+            joint_vel=state.qvel[6:],
+            bias=bias,
+            trunk_pos=state.qpos[:3],
+            trunk_rot=jnp.stack(poses[0].rot, axis=1),
+            trunk_vel=state.qvel[:3],
+            trunk_angvel=moving[0, :3],
+            geom_pos=jnp.stack(centre, axis=1),
+            geom_low=low if self.around.floor else jnp.full_like(low, FAR),
+            body=own,
+        )
 
     def _advance(self, state: BodyState, moment: Moment, torque: jax.Array) -> BodyState:
         tree: Tree = state.parameters
@@ -291,26 +315,11 @@ class TreePlant(Plant[Moment]):
         return BodyState(qpos, qvel, warmstart, jnp.stack(pushed), state.friction)
 
 
-def _sensed(
-    tree: Tree, state: BodyState, poses: Sequence[Pose], moving: jax.Array, bias: jax.Array
-) -> Sensed:
-    """Sense the root as trunk and every block as watched; missing blocks are far up."""
-    centre = [c + state.qpos[i] for i, c in enumerate(centres(tree, poses))]
-    weight, low = tree.mass / jnp.sum(tree.mass, axis=0), lows(tree, poses)
-    return Sensed(
-        joint_pos=state.qpos[7:],
-        joint_vel=state.qvel[6:],
-        bias=bias,
-        trunk_pos=state.qpos[:3],
-        trunk_rot=jnp.stack(poses[0].rot, axis=1),
-        trunk_vel=state.qvel[:3],
-        trunk_angvel=moving[0, :3],
-        past=jnp.max(jnp.abs(state.qpos[7:]) - tree.high[1:], axis=0),
-        middle=jnp.stack([jnp.sum(weight * c, axis=0) for c in centre]),
-        geom_pos=jnp.stack(centre, axis=1),
-        geom_low=low,
-        sunk=jnp.max(-low / sizes(tree), axis=0),
-    )
+def _block_axes(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
+    """Return the own axes (rows) of each block in the world, [n, 3, 3]."""
+    rot = frames(poses)
+    own = [jnp.stack(turn_each(rot, tree.axes[:, k]), axis=1) for k in range(3)]
+    return jnp.stack(own, axis=1)
 
 
 def _solve_damped(mass: Rows, damping: jax.Array, force: jax.Array) -> list[jax.Array]:

@@ -32,6 +32,27 @@ FAR = 1e3
 
 
 @pytree
+class ModularSensed:
+    """Quantities of a modular body, `Sensed.body`.
+
+    com: [3] m, centre of all mass. momentum: [3] kg·m/s, total.
+    water_force: [3] N, total; 0 without water.
+    limit_excess: [] rad, largest excess of a hinge beyond its range.
+    depth: [] of the deepest block in the ground, in units of the block's size (the cube root of its
+    volume); negative where all are above.
+    geom_rot: [G, 3, 3], rows are the own axes of each watched block in the world; only where vision
+    needs it.
+    """
+
+    com: jax.Array
+    momentum: jax.Array
+    water_force: jax.Array
+    limit_excess: jax.Array
+    depth: jax.Array
+    geom_rot: jax.Array | None = None
+
+
+@pytree
 class Tree:
     """Numbers of a modular body.
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 
 PLANE, SPHERE, CAPSULE = (
     int(t)
@@ -309,8 +309,8 @@ Model: TypeAlias = Any
 
 
 def fuse(
-    model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None
-) -> tuple[Model, SenseLayout, Crossings | None]:
+    model: mujoco.MjModel, layout: ObservationLayout, crossings: Crossings | None
+) -> tuple[Model, ObservationLayout, Crossings | None]:
     """Merge the welded bodies; return all as it is if none is welded, or in a fluid.
 
     A fluid resists each body by itself.

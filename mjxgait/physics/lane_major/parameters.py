@@ -14,7 +14,7 @@ import numpy as np
 
 from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.derived import Bars, SenseLayout, read_bars, resized_bars, whole
+from mjxgait.physics.derived import Bars, ObservationLayout, read_bars, resized_bars, whole
 from mjxgait.physics.lane_major.lanes import columns, constants
 from mjxgait.physics.lane_major.model import (
     Model,
@@ -118,7 +118,9 @@ class Parameters:
     bars: Bars
 
 
-def read_parameters(model: Model, layout: SenseLayout, crossings: Crossings | None) -> Parameters:
+def read_parameters(
+    model: Model, layout: ObservationLayout, crossings: Crossings | None
+) -> Parameters:
     """Read the numbers of a model, in NumPy.
 
     Raises:
@@ -216,7 +218,7 @@ def _bars(crossings: Crossings | None) -> Bars:
     return dataclasses.replace(bars, centre=centre, half=half)
 
 
-def _watched(model: Model, layout: SenseLayout) -> Watched:
+def _watched(model: Model, layout: ObservationLayout) -> Watched:
     geoms = [int(g) for g in layout.watched]
     extents = [geometry.support_extents(model.geom_type[g], model.geom_size[g]) for g in geoms]
     radius, box, ellipsoid = (np.array(column) for column in zip(*extents, strict=True))
@@ -229,7 +231,7 @@ def _watched(model: Model, layout: SenseLayout) -> Watched:
     )
 
 
-def resized(topology: Topology, parameters: Parameters, factor: Number) -> Parameters:
+def with_length_scale(topology: Topology, parameters: Parameters, factor: Number) -> Parameters:
     """Multiply lengths by factor [B], masses by its cube, inertias by its fifth power.
 
     The weights are not recomputed yet.

@@ -12,7 +12,7 @@ import numpy as np
 
 from mjxgait.creature.ground.surface import Ground, clearance, height
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.derived import OtherTopology, SenseLayout, deepest
+from mjxgait.physics.derived import ObservationLayout, OtherTopology, deepest
 from mjxgait.physics.lane_major.constraints import make_constraints, touch
 from mjxgait.physics.lane_major.dynamics import (
     bias_force,
@@ -47,7 +47,7 @@ from mjxgait.physics.lane_major.lanes import (
 from mjxgait.physics.lane_major.model import UnsupportedModel, fuse
 from mjxgait.physics.lane_major.newton import Problem, constrained_acceleration
 from mjxgait.physics.lane_major.padded import difference, make_room
-from mjxgait.physics.lane_major.parameters import Parameters, read_parameters, resized
+from mjxgait.physics.lane_major.parameters import Parameters, read_parameters, with_length_scale
 from mjxgait.physics.lane_major.structure import Geom, Structure, join
 from mjxgait.physics.lane_major.topology import Topology, read_topology
 from mjxgait.physics.lane_major.treematrix import (
@@ -68,7 +68,7 @@ from mjxgait.types import (
 
 
 @pytree
-class Workings:
+class StepData:
     """Step data. mass: rows of the mass matrix. bias: [nv, L]. touch: the contacts' geometry."""
 
     mass: Rows
@@ -95,7 +95,7 @@ class FastPlant:
         return join(self.topology, self.parameters, np.dtype(np.float32))
 
     def parameters_of(
-        self, model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None = None
+        self, model: mujoco.MjModel, layout: ObservationLayout, crossings: Crossings | None = None
     ) -> Parameters:
         """See `Plant.parameters_of`."""
         try:
@@ -111,8 +111,8 @@ class FastPlant:
         """See `Plant.with_parameters`."""
         return dataclasses.replace(self, parameters=parameters)
 
-    def heavier(self, parameters: Parameters, factor: Number) -> Parameters:
-        """See `Plant.heavier`."""
+    def with_mass_scale(self, parameters: Parameters, factor: Number) -> Parameters:
+        """See `Plant.with_mass_scale`."""
         factor = self._of_moving(factor)
         heavy = dataclasses.replace(
             parameters,
@@ -121,9 +121,9 @@ class FastPlant:
         )
         return self._reweighed(parameters, heavy)
 
-    def resized(self, parameters: Parameters, factor: Number) -> Parameters:
-        """See `Plant.resized`."""
-        large = resized(self.topology, parameters, self._of_moving(factor))
+    def with_length_scale(self, parameters: Parameters, factor: Number) -> Parameters:
+        """See `Plant.with_length_scale`."""
+        large = with_length_scale(self.topology, parameters, self._of_moving(factor))
         return self._reweighed(parameters, large)
 
     def _of_moving(self, factor: Number) -> Number:
@@ -143,18 +143,18 @@ class FastPlant:
         contacts = dataclasses.replace(weighed.contacts, weight=before.contacts.weight * ratio)
         return dataclasses.replace(weighed, contacts=contacts)
 
-    def forward(self, state: BodyState) -> tuple[Sensed, Workings]:
+    def forward(self, state: BodyState) -> tuple[Sensed, StepData]:
         """See `Plant.forward`."""
         return one_kernel(self._forward)(state)
 
-    def solve_damped(self, workings: Workings, damping: jax.Array, force: jax.Array) -> jax.Array:
+    def solve_damped(self, step_data: StepData, damping: jax.Array, force: jax.Array) -> jax.Array:
         """See `Plant.solve_damped`."""
-        return jnp.stack(one_kernel(self._solve_damped)(workings.mass, damping, force))
+        return jnp.stack(one_kernel(self._solve_damped)(step_data.mass, damping, force))
 
-    def advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
+    def advance(self, state: BodyState, step_data: StepData, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
         # Numbers and ground bypass the kernel, which would copy them.
-        after = one_kernel(self._advance)(state, workings, torque)
+        after = one_kernel(self._advance)(state, step_data, torque)
         return dataclasses.replace(after, parameters=state.parameters, ground=state.ground)
 
     def overlap(self, state: BodyState) -> jax.Array:
@@ -175,7 +175,7 @@ class FastPlant:
             return join(self.topology, self.parameters, state.qpos.dtype)
         return join(self.topology, state.parameters, state.qpos.dtype, per_lane=True)
 
-    def _forward(self, state: BodyState) -> tuple[Sensed, Workings]:
+    def _forward(self, state: BodyState) -> tuple[Sensed, StepData]:
         structure, like = self._body(state), state.friction
         pin = pinned_by(like)
         poses, freedoms = posture(structure, state.qpos, pin)
@@ -188,7 +188,7 @@ class FastPlant:
         bias = pin(bias)
         paths = motion_paths(structure, freedom, pin)
         mass = mass_rows(structure, body, freedom, paths, pin)
-        return _sense(structure, state, poses, moving, bias), Workings(
+        return _sense(structure, state, poses, moving, bias), StepData(
             mass, bias, touch(structure, poses, freedom, paths, pin, state.ground)
         )
 
@@ -197,20 +197,20 @@ class FastPlant:
         damped = tuple(on_pivot(row, damping[k]) for k, row in enumerate(mass))
         return solve(pattern, factor(pattern, damped), list(force))
 
-    def _advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
+    def _advance(self, state: BodyState, step_data: StepData, torque: jax.Array) -> BodyState:
         structure = self._body(state)
-        pin, force = pinned_by(state.friction), list(torque - workings.bias)
+        pin, force = pinned_by(state.friction), list(torque - step_data.bias)
         constraints = make_constraints(
-            structure, workings.touch, state.friction, state.qpos, state.qvel, pin
+            structure, step_data.touch, state.friction, state.qpos, state.qvel, pin
         )
         if constraints is None or not self.topology.warm_start:
-            guess = solve(structure.pattern, factor(structure.pattern, workings.mass), force)
+            guess = solve(structure.pattern, factor(structure.pattern, step_data.mass), force)
         else:
             guess = list(state.warmstart)
         if constraints is None:
             acceleration, pushed = guess, [jnp.zeros_like(state.friction)] * len(force)
         else:
-            problem = Problem(workings.mass, force, constraints, pin)
+            problem = Problem(step_data.mass, force, constraints, pin)
             acceleration, pushed = constrained_acceleration(problem, guess)
         warmstart = jnp.stack(acceleration)
         qvel = state.qvel + self.topology.step * warmstart
@@ -340,7 +340,7 @@ def take(rows: jax.Array, addresses: Sequence[int]) -> jax.Array:
 
 def fast_plant(
     model: mujoco.MjModel,
-    layout: SenseLayout,
+    layout: ObservationLayout,
     crossings: Crossings | None = None,
     roomy: bool = False,
 ) -> FastPlant:

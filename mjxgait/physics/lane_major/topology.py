@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.derived import ObservationLayout
 from mjxgait.physics.lane_major.model import (
     CAPSULE,
     Fused,
@@ -105,7 +105,7 @@ class Topology:
         return find_carriers(self.bodies, self.pattern, self.contacts)
 
 
-def read_topology(model: Model, layout: SenseLayout, crossings: Crossings | None) -> Topology:
+def read_topology(model: Model, layout: ObservationLayout, crossings: Crossings | None) -> Topology:
     """Read a model's topology, with what `layout` senses and the pairs in `crossings`.
 
     Raises:

@@ -88,7 +88,7 @@ class HopConfig(GoalConfig):
 
 @dataclasses.dataclass(frozen=True)
 class TravelWeights:
-    """See `HopWeights`.
+    """Extension of `HopWeights`.
 
     Attributes:
       distance: share left of the way to the nominal goal, negative beyond it.
@@ -130,7 +130,7 @@ LIMBO_NOMINAL_GOAL = 1.4
 
 @dataclasses.dataclass(frozen=True)
 class LimboWeights(HopWeights):
-    """See `HopWeights`.
+    """Extension of `HopWeights`.
 
     Attributes:
       bar: greatest depth in the bar and in the space above it.

@@ -23,7 +23,10 @@ HIGHEST = 1e3
 
 
 class GoalCriteria(Unasked, abc.ABC):
-    """See `AcceptanceCriteria`. Pushes decide nothing: in half of a hop the body cannot react."""
+    """Implementation of `AcceptanceCriteria`.
+
+    Pushes decide nothing: in half of a hop the body cannot react.
+    """
 
     drag: float = 0.0
     pushed: bool = True
@@ -43,13 +46,13 @@ class GoalCriteria(Unasked, abc.ABC):
         """Criterion 2: progress on the way."""
 
     def fall(self, config: CertificateConfig) -> Fall:
-        """See `AcceptanceCriteria`: a head or an elbow on the floor, or a base on its edge."""
+        """A head or an elbow on the floor, or a base on its edge."""
         return Fall(min_up=self.wanted(config).min_up, height=(0.0, HIGHEST), touch=True)
 
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `AcceptanceCriteria`: a goal for each simulation without one."""
+        """A goal for each simulation without one."""
         wanted = self.wanted(config)
         drawn = wanted.nominal if rng is None else rng.uniform(*wanted.goals, len(starts))
         return dataclasses.replace(starts, goal=np.where(starts.goal > 0, starts.goal, drawn))
@@ -57,7 +60,7 @@ class GoalCriteria(Unasked, abc.ABC):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: 1 and 2, both at half the time step too, 8, 9; without a warm-up."""
+        """Evaluate criteria 1 and 2, both at half the time step too, 8, 9; without a warm-up."""
         basic, repeated = (self.basic(each, config) for each in (whole, halved))
         failed = sum(not m.passed for c in repeated for m in c.measures)
         of = " and ".join(str(c.number) for c in basic)
@@ -71,17 +74,17 @@ class GoalCriteria(Unasked, abc.ABC):
     def kept(
         self, champion: Champion, whole: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: evolution has promised nothing."""
+        """Return no criteria: evolution has promised nothing."""
         return ()
 
-    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """See `AcceptanceCriteria`: the same."""
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """Keep the goals."""
         return goal
 
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: 4. The effect of pushes is only reported."""
+        """Evaluate criterion 4. The effect of pushes is only reported."""
         share = at_least(self.share, started, self.wanted(config).arrive, 1.0)
         return (Criterion(4, "perturbed starts and other goals", (share,)),)
 
@@ -93,7 +96,7 @@ class GoalCriteria(Unasked, abc.ABC):
 
 
 class HopCriteria(GoalCriteria):
-    """See `AcceptanceCriteria`.
+    """Implementation of `AcceptanceCriteria`.
 
     worth: not all trials, because an episode is shorter than the certification, and a slow hopper
       may still reach a far goal in time.
@@ -108,14 +111,14 @@ class HopCriteria(GoalCriteria):
         return config.hop
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `AcceptanceCriteria`: those that stayed up, arrived, and stayed there."""
+        """Simulations that stayed up, arrived, and stayed there."""
         wanted = self.wanted(config)
         frames = frames_in(wanted.stay, outcome.trajectory.time_step)
         left = away(starts.goal[:, None], outcome.path, outcome.aside)
         return outcome.stayed_up & (farthest(left, starts.goal, frames) <= wanted.near)
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `AcceptanceCriteria`: down, or away from the goal at a time that counts."""
+        """Down, or away from the goal at a time that counts."""
         wanted = self.wanted(CertificateConfig())
         frames = frames_in(wanted.stay, outcome.trajectory.time_step)
         due = slice(outcome.path.shape[1] - frames, steps)
@@ -124,7 +127,7 @@ class HopCriteria(GoalCriteria):
         return super().lost(outcome, starts, steps) | outside.any(1)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
-        """See `AcceptanceCriteria`: distance from the goal at the end, and time of the final arrival."""
+        """Distance from the goal at the end, and time of the final arrival."""
         left = _left(whole)
         outside = np.flatnonzero(~(left <= self.wanted(config).near * whole.goal))
         begins = outside[-1] + 1 if len(outside) else 0
@@ -139,7 +142,7 @@ class HopCriteria(GoalCriteria):
         }
 
     def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
-        """See `GoalCriteria`: it arrives and stays."""
+        """Arrive, and stay."""
         wanted = self.wanted(config)
         frames = frames_in(wanted.stay, whole.time_step)
         left = farthest(_left(whole)[None], np.array([whole.goal]), frames)[0]
@@ -149,7 +152,7 @@ class HopCriteria(GoalCriteria):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `AcceptanceCriteria`: no early end, and near the goal at the end."""
+        """No early end, and near the goal at the end."""
         near: np.ndarray = outcome["off"] <= self.wanted(CertificateConfig()).near
         return to_the_end(outcome, seconds, creature) & near
 
@@ -190,7 +193,10 @@ ENOUGH = 0.01
 
 
 class LimboCriteria(HopCriteria):
-    """See `AcceptanceCriteria`. Goals lie beyond the bar, so arrival implies passing it."""
+    """Implementation of `AcceptanceCriteria`.
+
+    Goals lie beyond the bar, so arrival implies passing it.
+    """
 
     verdict = "it gets to its goal beneath the bar and stays"
 
@@ -201,29 +207,29 @@ class LimboCriteria(HopCriteria):
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `AcceptanceCriteria`: a goal and a bar for each simulation without one."""
+        """A goal and a bar for each simulation without one."""
         bar = np.array([config.limbo.place, config.limbo.height])
         given = np.where(np.isfinite(starts.bar), starts.bar, bar)
         return dataclasses.replace(super().aimed(starts, config, rng), bar=given)
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `AcceptanceCriteria`: those that stayed up and clear, arrived, and stayed there."""
+        """Simulations that stayed up and clear, arrived, and stayed there."""
         clear: np.ndarray = outcome.clearance > config.limbo.clearance
         return super().succeeded(outcome, starts, config) & clear
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `AcceptanceCriteria`: as for hopping, and any contact with the bar."""
+        """Lost hops, and any contact with the bar."""
         touched = outcome.clearance <= CertificateConfig().limbo.clearance
         return super().lost(outcome, starts, steps) | touched
 
     def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `GoalCriteria`: 1, 2 and 3."""
+        """Evaluate criteria 1, 2 and 3."""
         least, room = _least(whole), config.limbo.clearance
         clear = at_least("least clearance (m)", least, room, room + ENOUGH)
         return (*super().basic(whole, config), Criterion(3, "clear of the bar", (clear,)))
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
-        """See `AcceptanceCriteria`: as for hopping, and the least clearance."""
+        """Report of a hop, and the least clearance."""
         told = super().report(whole, config)
         least = _least(whole)
         bar = f"a bar {config.limbo.height:g} m high {'cleared' if least > 0 else 'touched'}"
@@ -232,7 +238,7 @@ class LimboCriteria(HopCriteria):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `AcceptanceCriteria`: as for hopping, and clear of the bar of the certification.
+        """A managed hop that is clear of the bar of the certification.
 
         The bar in evolution may be lower.
         """
@@ -250,7 +256,10 @@ NEAR = 0.05
 
 
 class TravelCriteria(GoalCriteria):
-    """See `AcceptanceCriteria`. A goal that is near, or passed, moves on by its first distance."""
+    """Implementation of `AcceptanceCriteria`.
+
+    A goal that is near, or passed, moves on by its first distance.
+    """
 
     verdict = "it travels from goal to goal"
     share = "share that travels"
@@ -262,17 +271,17 @@ class TravelCriteria(GoalCriteria):
         return config.travel
 
     @override
-    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         reached = goal - way <= NEAR * first
         return np.where(reached, goal + first, goal)
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `AcceptanceCriteria`: those that stayed up and were fast enough."""
+        """Simulations that stayed up and were fast enough."""
         seconds = outcome.path.shape[1] * outcome.trajectory.time_step
         return outcome.stayed_up & (outcome.path[:, -1] >= config.travel.speed * seconds)
 
     def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
-        """See `GoalCriteria`: fast enough, and not much slower in the second half."""
+        """Fast enough, and not much slower in the second half."""
         wanted = config.travel
         way = whole.trunk_pos[:, 0]
         half, seconds = len(way) // 2, len(way) * whole.time_step
@@ -289,15 +298,15 @@ class TravelCriteria(GoalCriteria):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: as for all tasks with a goal, and 7: no motion by vibration."""
+        """Criteria of all tasks with a goal, and 7: no motion by vibration."""
         gait = Criterion(7, "gait", (vibration(whole, config.gait),))
         return (*super().undisturbed(whole, halved, config), gait)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
-        """See `AcceptanceCriteria`: distance travelled, and number of goals."""
+        """Distance travelled, and number of goals."""
         way, goal, goals = whole.trunk_pos[:, 0], np.array(whole.goal), 0
         for place in np.maximum.accumulate(way):
-            ahead = self.onward(goal, np.array(whole.goal), place)
+            ahead = self.next_goal(goal, np.array(whole.goal), place)
             goals, goal = goals + int(ahead > goal), ahead
         seconds = len(way) * whole.time_step
         return {
@@ -311,6 +320,6 @@ class TravelCriteria(GoalCriteria):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `AcceptanceCriteria`: no early end, and fast enough."""
+        """No early end, and fast enough."""
         fast: np.ndarray = outcome["way"] >= CertificateConfig().travel.speed * seconds
         return to_the_end(outcome, seconds, creature) & fast

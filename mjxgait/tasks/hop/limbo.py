@@ -64,19 +64,19 @@ THERE, BENEATH = 0.6, 0.05
 
 
 @pytree
-class Aim:
+class Goal:
     """Goal and bar of one trial.
 
-    goal: [] m ahead of the start. raised: [] m by which the bar is above its final height.
+    ahead: [] m from the start to the goal. raised: [] m by which the bar is above its final height.
     """
 
-    goal: jax.Array
+    ahead: jax.Array
     raised: jax.Array
 
 
 @pytree
-class Tally(hop.Tally):
-    """See `hop.Tally`.
+class EpisodeStats(hop.EpisodeStats):
+    """Extension of `hop.EpisodeStats`.
 
     bar: [] m, greatest depth in the bar at its final height.
     raised: [] m of it that cost nothing yet.
@@ -89,8 +89,8 @@ class Tally(hop.Tally):
 
 
 @pytree
-class Standards(hop.Standards):
-    """See `hop.Standards`. height: [] m, of the bar."""
+class TaskParams(hop.TaskParams):
+    """Extension of `hop.TaskParams`. height: [] m, of the bar."""
 
     height: jax.Array
 
@@ -101,7 +101,7 @@ class Limbo(Hop):
     Settings = LimboConfig
     outcomes = (*Hop.outcomes, "bar")
     adds = (*Hop.adds, "bar_distance")
-    climbs = True
+    has_curriculum = True
     goals, nominal = LIMBO_GOALS, LIMBO_NOMINAL_GOAL
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
@@ -113,60 +113,58 @@ class Limbo(Hop):
         if not parse_ground(settings.ground).flat:
             raise UserError(f"rollout.ground = {settings.ground}: task limbo needs flat ground")
         starts = super().trials(key, creature, settings)
-        return dataclasses.replace(starts, raised=jnp.zeros(settings.starts))
+        return dataclasses.replace(starts, goal=Goal(starts.goal, jnp.zeros(settings.starts)))
 
     @override
     def levels(self, settings: LimboConfig) -> jax.Array | int:
         steps: jax.Array | int = settings.lowering
         return steps
 
-    def harder(self, trials: Starts, settings: LimboConfig, level: jax.Array) -> Starts:
-        """See `Task`: the bar comes down, so that hoppers learn to duck little by little."""
+    def at_level(self, trials: Starts, settings: LimboConfig, level: jax.Array) -> Starts:
+        """The bar comes down, so that hoppers learn to duck little by little."""
         left = 1.0 - ramped(settings.lowering, level)
         raised = jnp.full(trials.friction.shape, settings.higher * left)
-        return dataclasses.replace(trials, raised=raised)
+        return dataclasses.replace(trials, goal=Goal(trials.goal.ahead, raised))
 
-    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
-        """See `Task`: at the goal in the end, and hardly in the bar."""
+    def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+        """At the goal in the end, and hardly in the bar."""
         return (terms[MISSED] <= THERE) & (terms["bar"] <= BENEATH)
 
     @override
-    def aim(self, trial: Starts) -> Any:
-        return Aim(super().aim(trial), jnp.asarray(trial.raised))
+    def goal(self, trial: Starts) -> Any:
+        return jax.tree.map(jnp.asarray, trial.goal)
 
     @override
-    def standards(self, settings: Any) -> Standards:
+    def params(self, settings: Any) -> TaskParams:
         height = jnp.asarray(settings.height, jnp.float32)
-        return Standards(**vars(super().standards(settings)), height=height)
+        return TaskParams(**vars(super().params(settings)), height=height)
 
     @override
-    def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
-        return super().senses(aim.goal, sensed) | {
+    def observations(self, goal: Any, sensed: Sensed) -> dict[str, jax.Array]:
+        return super().observations(goal.ahead, sensed) | {
             "bar_distance": bar_distance(self.creature, sensed)
         }
 
     @override
-    def init(self) -> Tally:
+    def init(self) -> EpisodeStats:
         none = jnp.zeros(())
-        return Tally(**vars(super().init()), bar=none, raised=none, height=none)
+        return EpisodeStats(**vars(super().init()), bar=none, raised=none, height=none)
 
     @override
-    def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
-    ) -> Any:
-        after: Any = super().update(tally, sensed, torque, standards, aim.goal)
-        deepest = jnp.maximum(tally.bar, intrusion(self.creature, sensed, standards.height))
-        return dataclasses.replace(after, bar=deepest, raised=aim.raised, height=standards.height)
+    def update(self, stats: Any, sensed: Sensed, torque: jax.Array, params: Any, goal: Any) -> Any:
+        after: Any = super().update(stats, sensed, torque, params, goal.ahead)
+        deepest = jnp.maximum(stats.bar, intrusion(self.creature, sensed, params.height))
+        return dataclasses.replace(after, bar=deepest, raised=goal.raised, height=params.height)
 
     @override
-    def judge(self, tally: Any, settings: object) -> dict[str, jax.Array]:
-        deep = jnp.maximum(tally.bar - tally.raised, 0.0)
+    def evaluate(self, stats: Any, settings: object) -> dict[str, jax.Array]:
+        deep = jnp.maximum(stats.bar - stats.raised, 0.0)
         bar = jnp.minimum(deep / (DEEP * self.creature.frame.hip_height), 1.0)
-        return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})
+        return fitness_terms(self.creature, self.horizon, stats, {"bar": bar})
 
-    def outcome(self, tally: Any) -> dict[str, jax.Array]:
-        """See `Task`: as for hopping, and the height in m of a bar that would just be cleared.
+    def outcome(self, stats: Any) -> dict[str, jax.Array]:
+        """Metrics of a hop, and the height in m of a bar that would just be cleared.
 
         It is at least the height of the bar itself.
         """
-        return super().outcome(tally) | {"bar": tally.height + tally.bar}
+        return super().outcome(stats) | {"bar": stats.height + stats.bar}

@@ -19,7 +19,7 @@ SLOW, SLOW_TURN = 0.0005, 0.005
 
 
 @pytree
-class Tally(protocol.Tally):
+class EpisodeStats(protocol.EpisodeStats):
     """Statistics over the steps of an episode until it ends.
 
     reason: a `falls.Reason`.
@@ -51,7 +51,7 @@ class Tally(protocol.Tally):
 
 
 @pytree
-class Standards:
+class TaskParams:
     """Task parameters of an episode.
 
     rest: [] steps without motion that end an episode; never if 0.
@@ -60,13 +60,13 @@ class Standards:
     rest: jax.Array
 
 
-def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0) -> Tally:
+def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0) -> EpisodeStats:
     """Return the statistics before any motion, whatever the goal.
 
     energy: whether work counts. sub_goals: their number.
     """
     none, zero, one = jnp.zeros((), jnp.int32), jnp.zeros(()), jnp.ones(())
-    return Tally(
+    return EpisodeStats(
         steps=none,
         reason=none,
         overlap=zero,
@@ -94,48 +94,50 @@ def distance(left: jax.Array, aside: jax.Array) -> jax.Array:
     return jnp.sqrt(left * left + aside * aside)
 
 
-def away(tally: Tally) -> jax.Array:
+def away(stats: EpisodeStats) -> jax.Array:
     """Distance [] in m from the latest position to the goal, measured in the plane."""
-    return distance(tally.left, tally.aside)
+    return distance(stats.left, stats.aside)
 
 
-def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax.Array) -> Tally:
+def updated(
+    creature: Body, step: float, stats: EpisodeStats, sensed: Sensed, goal: jax.Array
+) -> EpisodeStats:
     """Return the statistics after one more step. step: s. goal: [] m."""
     left = goal_distance(creature, goal, sensed)
     aside = sideways(creature, sensed)
     near = distance(left, aside) <= NEAR * goal
-    arrived = jnp.where(near, jnp.minimum(tally.arrived, tally.steps), tally.arrived)
+    arrived = jnp.where(near, jnp.minimum(stats.arrived, stats.steps), stats.arrived)
     moved = jnp.linalg.norm(sensed.trunk_vel) * step
     return dataclasses.replace(
-        tally,
-        steps=tally.steps + 1,
+        stats,
+        steps=stats.steps + 1,
         goal=goal,
         left=left,
         aside=aside,
         arrived=arrived,
-        after=tally.after + jnp.where(arrived < tally.steps, moved, 0.0),
-        ground=tally.ground + touches(creature, sensed),
+        after=stats.after + jnp.where(arrived < stats.steps, moved, 0.0),
+        ground=stats.ground + touches(creature, sensed),
         bent=jnp.abs(sensed.joint_pos - creature.joints.stand.astype(np.float32)),
-        fastest=jnp.maximum(tally.fastest, jnp.max(jnp.abs(sensed.joint_vel), initial=0.0)),
-        still=jnp.where(moves(sensed), 0, tally.still + 1),
+        fastest=jnp.maximum(stats.fastest, jnp.max(jnp.abs(sensed.joint_vel), initial=0.0)),
+        still=jnp.where(moves(sensed), 0, stats.still + 1),
     )
 
 
 def with_extras(
-    tally: Tally, sensed: Sensed, torque: jax.Array, step: float, sub_goals: Sequence[float]
-) -> Tally:
+    stats: EpisodeStats, sensed: Sensed, torque: jax.Array, step: float, sub_goals: Sequence[float]
+) -> EpisodeStats:
     """Add the statistics that only some settings count: work, and distances to sub-goals.
 
     torque: [J] N·m. step: s. sub_goals: [G] shares of the straight way to the goal.
     """
-    if tally.work is not None:
-        done = tally.work + positive_work(torque, sensed, step)
-        tally = dataclasses.replace(tally, work=done)
-    if tally.closest is not None:
-        way = tally.goal - tally.left
-        apart = distance(jnp.array(sub_goals) * tally.goal - way, tally.aside)
-        tally = dataclasses.replace(tally, closest=jnp.minimum(tally.closest, apart))
-    return tally
+    if stats.work is not None:
+        done = stats.work + positive_work(torque, sensed, step)
+        stats = dataclasses.replace(stats, work=done)
+    if stats.closest is not None:
+        way = stats.goal - stats.left
+        apart = distance(jnp.array(sub_goals) * stats.goal - way, stats.aside)
+        stats = dataclasses.replace(stats, closest=jnp.minimum(stats.closest, apart))
+    return stats
 
 
 def moves(sensed: Sensed) -> jax.Array:
@@ -144,15 +146,15 @@ def moves(sensed: Sensed) -> jax.Array:
     return (jnp.max(jnp.abs(sensed.trunk_vel)) > SLOW) | (jnp.max(jnp.abs(turning)) > SLOW_TURN)
 
 
-def rested(tally: Tally, horizon: int, rest: jax.Array, touching: jax.Array) -> Tally:
+def rested(stats: EpisodeStats, horizon: int, rest: jax.Array, touching: jax.Array) -> EpisodeStats:
     """Move the statistics to the end of the episode if nothing has moved for `rest` steps [].
 
     A `rest` of 0 never does. touching: [] whether a part is on the floor that must not.
     """
-    over = (rest > 0) & (tally.still >= rest)
-    left = jnp.where(over, horizon - tally.steps, 0)
+    over = (rest > 0) & (stats.still >= rest)
+    left = jnp.where(over, horizon - stats.steps, 0)
     return dataclasses.replace(
-        tally, steps=tally.steps + left, ground=tally.ground + left * touching
+        stats, steps=stats.steps + left, ground=stats.ground + left * touching
     )
 
 
@@ -181,7 +183,7 @@ def terms_under(weights: HopWeights | TravelWeights) -> tuple[str, ...]:
 
 
 def fitness_terms(
-    creature: Body, horizon: int, tally: Tally, more: Mapping[str, jax.Array] | None = None
+    creature: Body, horizon: int, stats: EpisodeStats, more: Mapping[str, jax.Array] | None = None
 ) -> dict[str, jax.Array]:
     """Return the terms [] of one episode, each without unit and before its weight; all are >= 0.
 
@@ -191,32 +193,32 @@ def fitness_terms(
     Args:
       horizon: T, steps of a full episode. more: style that another task adds.
     """
-    left = away(tally) / tally.goal
+    left = away(stats) / stats.goal
     near = jnp.clip(1.0 - left, 0.0, 1.0)
-    style = style_terms(creature, horizon, tally) | dict(more or {})
+    style = style_terms(creature, horizon, stats) | dict(more or {})
     terms = {GOAL: jnp.minimum(left, FARTHEST), MISSED: jnp.minimum(left / NEAR, 1.0)}
     terms |= {name: near * value for name, value in style.items()}
-    if tally.closest is not None:
-        terms["sub_goals"] = jnp.mean(jnp.minimum(tally.closest / tally.goal, 1.0))
+    if stats.closest is not None:
+        terms["sub_goals"] = jnp.mean(jnp.minimum(stats.closest / stats.goal, 1.0))
     return terms
 
 
-def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Array]:
+def style_terms(creature: Body, horizon: int, stats: EpisodeStats) -> dict[str, jax.Array]:
     """Style terms [] of one episode, not scaled by how near it got."""
-    lived = jnp.maximum(tally.steps, 1)
+    lived = jnp.maximum(stats.steps, 1)
     half_range = 0.5 * (creature.joints.pose_high - creature.joints.pose_low).astype(jnp.float32)
     terms = {
-        "time": tally.arrived / horizon,
-        "restless": jnp.minimum(tally.after / tally.goal, 1.0),
-        "ground": tally.ground / lived,
-        "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
-        "fast": jnp.clip(tally.fastest / FASTEST - FAST, 0.0, 1.0 - FAST) / (1.0 - FAST),
-        "neutral": jnp.minimum(jnp.mean(tally.bent / jnp.maximum(half_range, 1e-6)), 1.0),
-        "overlap": crossed(creature, tally.overlap),
+        "time": stats.arrived / horizon,
+        "restless": jnp.minimum(stats.after / stats.goal, 1.0),
+        "ground": stats.ground / lived,
+        "fall": jnp.where(stats.reason == Reason.FINISHED, 0.0, 1.0),
+        "fast": jnp.clip(stats.fastest / FASTEST - FAST, 0.0, 1.0 - FAST) / (1.0 - FAST),
+        "neutral": jnp.minimum(jnp.mean(stats.bent / jnp.maximum(half_range, 1e-6)), 1.0),
+        "overlap": crossed(creature, stats.overlap),
     }
-    if tally.work is not None:
-        way = jnp.maximum(tally.goal - tally.left, SHORTEST * creature.frame.body_length)
-        terms["energy"] = cost_of_transport(creature, tally.work, way)
+    if stats.work is not None:
+        way = jnp.maximum(stats.goal - stats.left, SHORTEST * creature.frame.body_length)
+        terms["energy"] = cost_of_transport(creature, stats.work, way)
     return terms
 
 

@@ -16,8 +16,8 @@ from mjxgait.tasks.hop import stats as hop
 from mjxgait.tasks.hop.config import GOALS, NEAR, NOMINAL_GOAL, GoalConfig, HopConfig, TravelConfig
 from mjxgait.tasks.hop.stats import (
     GOAL,
-    Standards,
-    Tally,
+    EpisodeStats,
+    TaskParams,
     away,
     empty,
     fitness_terms,
@@ -55,7 +55,7 @@ class Hop(PlainTask):
         self.settings: Any = settings or self.Settings()
 
     @classmethod
-    def told(
+    def with_settings(
         cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: GoalConfig
     ) -> "Hop":
         """Return the task with these settings, which decide the terms."""
@@ -72,7 +72,7 @@ class Hop(PlainTask):
         return self.settings.sub_goals if "sub_goals" in self.terms else ()
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the usual starts, each with a goal of its own; the first is nominal."""
+        """The usual starts, each with its goal [] in m ahead; the first is nominal."""
         starts = draw_starts(key, creature, settings)
         low, high = self.goals
         # A separate key keeps the starts the same as those of every other task.
@@ -80,43 +80,48 @@ class Hop(PlainTask):
         goals = (low + (high - low) * drawn).at[0].set(self.nominal)
         return dataclasses.replace(starts, goal=goals)
 
-    def aim(self, trial: Starts) -> jax.Array:
-        """See `Task`: the goal [] in m ahead of the start."""
+    def goal(self, trial: Starts) -> jax.Array:
+        """The goal [] in m ahead of the start."""
         return jnp.asarray(trial.goal)
 
     @override
-    def standards(self, settings: GoalConfig) -> Standards:
-        return Standards(jnp.round(settings.rest / self.step))
+    def params(self, settings: GoalConfig) -> TaskParams:
+        return TaskParams(jnp.round(settings.rest / self.step))
 
     @override
-    def senses(self, aim: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
-        return {"goal_distance": goal_distance(self.creature, aim, sensed)}
+    def observations(self, goal: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
+        return {"goal_distance": goal_distance(self.creature, goal, sensed)}
 
     @override
-    def init(self) -> Tally:
+    def init(self) -> EpisodeStats:
         energy = "energy" in self.terms
         return empty(self.creature, self.horizon, energy, len(self.sub_goals))
 
     @override
     def update(
-        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Standards, aim: jax.Array
-    ) -> Tally:
-        after = updated(self.creature, self.step, tally, sensed, aim)
+        self,
+        stats: EpisodeStats,
+        sensed: Sensed,
+        torque: jax.Array,
+        params: TaskParams,
+        goal: jax.Array,
+    ) -> EpisodeStats:
+        after = updated(self.creature, self.step, stats, sensed, goal)
         after = with_extras(after, sensed, torque, self.step, self.sub_goals)
-        return rested(after, self.horizon, standards.rest, touches(self.creature, sensed))
+        return rested(after, self.horizon, params.rest, touches(self.creature, sensed))
 
     @override
-    def judge(self, tally: Tally, settings: HopConfig) -> dict[str, jax.Array]:
-        return fitness_terms(self.creature, self.horizon, tally)
+    def evaluate(self, stats: EpisodeStats, settings: HopConfig) -> dict[str, jax.Array]:
+        return fitness_terms(self.creature, self.horizon, stats)
 
-    def outcome(self, tally: Tally) -> dict[str, jax.Array]:
-        """See `Task`: final distance in m and in goal distances; s to the arrival and the end."""
-        left = away(tally)
+    def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
+        """Final distance in m and in goal distances; s to the arrival and the end."""
+        left = away(stats)
         return {
             "left": left,
-            "off": left / tally.goal,
-            "arrival": tally.arrived * self.step,
-            "seconds": tally.steps * self.step,
+            "off": left / stats.goal,
+            "arrival": stats.arrived * self.step,
+            "seconds": stats.steps * self.step,
         }
 
     @override
@@ -125,20 +130,20 @@ class Hop(PlainTask):
 
 
 @pytree
-class TravelTally(hop.Tally):
-    """See `hop.Tally`; goal is the latest. reached: [] goals."""
+class TravelStats(hop.EpisodeStats):
+    """Extension of `hop.EpisodeStats`; goal is the latest. reached: [] goals."""
 
     reached: jax.Array
 
 
 @pytree
-class Aim:
+class Goal:
     """Goal of the moment.
 
-    goal: [] m ahead of the start. spacing: [] m from one goal to the next.
+    ahead: [] m from the start to the goal. spacing: [] m from one goal to the next.
     """
 
-    goal: jax.Array
+    ahead: jax.Array
     spacing: jax.Array
 
 
@@ -148,46 +153,46 @@ class Travel(Hop):
     Settings: ClassVar[type] = TravelConfig
     outcomes = ("goals", "way", "seconds")
 
-    def aim(self, trial: Starts) -> Any:
-        """See `Task`: the distance to the first goal is also the spacing of all others."""
+    def goal(self, trial: Starts) -> Any:
+        """The distance to the first goal is also the spacing of all others."""
         goal = jnp.asarray(trial.goal)
-        return Aim(goal, goal)
+        return Goal(goal, goal)
 
-    def onward(self, aim: Aim, sensed: Sensed) -> Aim:
-        """See `Task`: a goal that is near, or passed, moves on."""
-        left = hop.goal_distance(self.creature, aim.goal, sensed)
-        reached = left <= NEAR * aim.spacing
-        return dataclasses.replace(aim, goal=aim.goal + jnp.where(reached, aim.spacing, 0.0))
-
-    @override
-    def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
-        return super().senses(aim.goal, sensed)
+    def next_goal(self, goal: Goal, sensed: Sensed) -> Goal:
+        """A goal that is near, or passed, moves on."""
+        left = hop.goal_distance(self.creature, goal.ahead, sensed)
+        reached = left <= NEAR * goal.spacing
+        return dataclasses.replace(goal, ahead=goal.ahead + jnp.where(reached, goal.spacing, 0.0))
 
     @override
-    def init(self) -> TravelTally:
-        return TravelTally(**vars(super().init()), reached=jnp.zeros((), jnp.int32))
+    def observations(self, goal: Any, sensed: Sensed) -> dict[str, jax.Array]:
+        return super().observations(goal.ahead, sensed)
+
+    @override
+    def init(self) -> TravelStats:
+        return TravelStats(**vars(super().init()), reached=jnp.zeros((), jnp.int32))
 
     @override
     def update(
-        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Standards, aim: Any
+        self, stats: EpisodeStats, sensed: Sensed, torque: jax.Array, params: TaskParams, goal: Any
     ) -> Any:
-        after: Any = super().update(tally, sensed, torque, standards, aim.goal)
-        reached = jnp.round(aim.goal / aim.spacing).astype(jnp.int32) - 1
+        after: Any = super().update(stats, sensed, torque, params, goal.ahead)
+        reached = jnp.round(goal.ahead / goal.spacing).astype(jnp.int32) - 1
         return dataclasses.replace(after, reached=reached)
 
-    def judge(self, tally: Tally, settings: object) -> dict[str, jax.Array]:
-        """See `Task`: style counts in proportion to the share of the way to the nominal goal."""
-        way = self._way(tally) / NOMINAL_GOAL
-        style = style_terms(self.creature, self.horizon, tally)
+    def evaluate(self, stats: EpisodeStats, settings: object) -> dict[str, jax.Array]:
+        """Style counts in proportion to the share of the way to the nominal goal."""
+        way = self._way(stats) / NOMINAL_GOAL
+        style = style_terms(self.creature, self.horizon, stats)
         near = jnp.clip(way, 0.0, 1.0)
         return {GOAL: 1.0 - way} | {n: near * style[n] for n in self.terms if n != GOAL}
 
-    def outcome(self, tally: Any) -> dict[str, jax.Array]:
-        """See `Task`: goals reached, m ahead of the start, s until the end."""
+    def outcome(self, stats: Any) -> dict[str, jax.Array]:
+        """Goals reached, m ahead of the start, s until the end."""
         return {
-            "goals": tally.reached.astype(jnp.float32),
-            "way": self._way(tally),
-            "seconds": tally.steps * self.step,
+            "goals": stats.reached.astype(jnp.float32),
+            "way": self._way(stats),
+            "seconds": stats.steps * self.step,
         }
 
     @override
@@ -196,5 +201,5 @@ class Travel(Hop):
     ) -> dict[str, jax.Array]:
         return signed_weights(settings, generation)
 
-    def _way(self, tally: Tally) -> jax.Array:
-        return jnp.where(tally.steps > 0, tally.goal - tally.left, 0.0)
+    def _way(self, stats: EpisodeStats) -> jax.Array:
+        return jnp.where(stats.steps > 0, stats.goal - stats.left, 0.0)

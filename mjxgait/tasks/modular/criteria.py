@@ -39,7 +39,10 @@ UNITS = {"speed": "m/s", "height": "m"}
 
 
 class ModularCriteria(StaysUp, abc.ABC):
-    """See `AcceptanceCriteria`. These bodies have no upright pose, so there are no falls and no pushes."""
+    """Implementation of `AcceptanceCriteria`.
+
+    These bodies have no upright pose, so there are no falls and no pushes.
+    """
 
     pushed = by_pushes = False
     grown = True
@@ -79,7 +82,7 @@ class ModularCriteria(StaysUp, abc.ABC):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `AcceptanceCriteria`: no early end, and clearly more than required."""
+        """No early end, and clearly more than required."""
         lived = to_the_end(outcome, seconds, creature)
         enough: np.ndarray = outcome[self.evidence] >= self.enough(seconds, CertificateConfig())
         return lived & enough
@@ -89,13 +92,13 @@ class ModularCriteria(StaysUp, abc.ABC):
         return ()
 
     def fall(self, config: CertificateConfig) -> Fall:
-        """See `AcceptanceCriteria`: never."""
+        """Return conditions that are never met."""
         return Fall(min_up=-2.0, height=(-np.inf, np.inf), touch=False)
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: 2, 6, 8, 9, and the task's own."""
+        """Evaluate criteria 2, 6, 8, 9, and the task's own."""
         window, other = whole.window(config.warmup), halved.window(config.warmup)
         does, repeated = (self.second(each, config) for each in (window, other))
         failed = sum(not m.passed for m in repeated.measures)
@@ -132,12 +135,12 @@ class ModularCriteria(StaysUp, abc.ABC):
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: 4."""
+        """Evaluate criterion 4."""
         share = at_least(f"share that {self.verb}", started, self.wanted(config).arrive, 1.0)
         return (Criterion(4, "perturbed starts", (share,)),)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
-        """See `AcceptanceCriteria`: the performance, and the body."""
+        """The performance, and the body."""
         window = whole.window(config.warmup)
         done, parts, unit = self.done(window), len(seen(whole).sizes), UNITS[self.promised]
         return {
@@ -150,7 +153,7 @@ class ModularCriteria(StaysUp, abc.ABC):
 
 
 class GoingCriteria(ModularCriteria):
-    """See `ModularCriteria`: motion in a straight line at a speed."""
+    """Implementation of `ModularCriteria`: motion in a straight line at a speed."""
 
     promised = "speed"
     axes = 3
@@ -165,17 +168,17 @@ class GoingCriteria(ModularCriteria):
         return gets_on(self.verb, self._middle(window), window.time_step, self.wanted(config))
 
     def done(self, window: Recording) -> float:
-        """See `ModularCriteria`: m/s."""
+        """Speed in m/s."""
         return float(flight(self._middle(window), window.time_step))
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `AcceptanceCriteria`: those as fast as criterion 2 requires, measured in the same way."""
+        """Simulations as fast as criterion 2 requires, measured in the same way."""
         middle = counted(outcome.middle, outcome, config)[..., : self.axes]
         fast = flight(middle, outcome.trajectory.time_step) >= self.wanted(config).speed
         return outcome.stayed_up & fast
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """See `ModularCriteria`: the distance in m due in all seconds, within those that count."""
+        """The distance in m due in all seconds, within those that count."""
         return self.wanted(config).speed * seconds
 
     def _middle(self, window: Recording) -> np.ndarray:
@@ -257,7 +260,7 @@ def seen(recording: Recording) -> Grown:
 
 
 class SwimCriteria(GoingCriteria):
-    """See `AcceptanceCriteria`. In water there is no up."""
+    """Implementation of `AcceptanceCriteria`. In water there is no up."""
 
     verdict = "it swims"
     verb = "swims"
@@ -268,7 +271,7 @@ class SwimCriteria(GoingCriteria):
         return config.swim
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `GoingCriteria`: 11, the source of the momentum."""
+        """Evaluate criterion 11, the source of the momentum."""
         return (by_water(window, config.swim),)
 
 
@@ -284,7 +287,10 @@ def by_water(window: Recording, config: SwimConfig) -> Criterion:
 
 
 class RoamCriteria(GoingCriteria):
-    """See `AcceptanceCriteria`. Only level distance counts: leaping up gains nothing."""
+    """Implementation of `AcceptanceCriteria`.
+
+    Only level distance counts: leaping up gains nothing.
+    """
 
     verdict = "it walks"
     verb = "walks"
@@ -295,7 +301,7 @@ class RoamCriteria(GoingCriteria):
         return config.roam
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `GoingCriteria`: 1, the side that was up after settling stays up."""
+        """Evaluate criterion 1: the side that was up after settling stays up."""
         return (balanced(window, config.roam),)
 
 
@@ -311,7 +317,10 @@ SPAN = 2.0
 
 
 class JumpCriteria(ModularCriteria):
-    """See `AcceptanceCriteria`: it jumps again and again, from perturbed starts too."""
+    """Implementation of `AcceptanceCriteria`.
+
+    It jumps again and again, from perturbed starts too.
+    """
 
     verdict = "it jumps"
     verb = "jumps"
@@ -328,21 +337,21 @@ class JumpCriteria(ModularCriteria):
         return Criterion(2, "jumps", (height,))
 
     def done(self, window: Recording) -> float:
-        """See `ModularCriteria`: m, of the lowest part at the best moment, mean of the spans."""
+        """Height in m of the lowest part at the best moment, mean of the spans."""
         return float(np.mean(highest(seen(window).low, window.time_step)))
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
-        """See `ModularCriteria`: for the undisturbed trial, not for all."""
+        """For the undisturbed trial, not for all."""
         return float(champion.origin.get("nominal", {}).get("height", np.nan))
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `AcceptanceCriteria`: those with a high enough leap in the median span."""
+        """Simulations with a high enough leap in the median span."""
         low = counted(outcome.low, outcome, config)
         middling = np.median(highest(low, outcome.trajectory.time_step), axis=-1)
         return outcome.stayed_up & (middling >= config.jump.height)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """See `ModularCriteria`: m, a quarter above the threshold."""
+        """Height in m, a quarter above the threshold."""
         return 1.25 * config.jump.height
 
 

@@ -16,13 +16,13 @@ from typing_extensions import override
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.controllers.sims_brain.reference_body import LIGHT
 from mjxgait.creature import Creature
-from mjxgait.tasks.modular.task import GoingTask, Roam, Swim, length
+from mjxgait.tasks.modular.task import GoingTask, Roam, Swim, length, own
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed
 
 
 class Following(GoingTask):
-    """See `Task`: base class for following in water and on land.
+    """Implementation of `Task`: base class for following in water and on land.
 
     The way is the decrease of the distance to the light.
     """
@@ -32,7 +32,7 @@ class Following(GoingTask):
     dark = np.zeros(3, np.float32)
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the first light is ahead, and in each round the others are elsewhere.
+        """The first light is ahead, and in each round the others are elsewhere.
 
         The lights of a round cancel out with the one ahead: moving straight on gains as much on
         some as it loses on the others.
@@ -42,45 +42,45 @@ class Following(GoingTask):
         keys = jax.random.split(jax.random.fold_in(key, 6), rounds)
         drawn = jax.vmap(lambda key: balanced(key, others, self.axes))(keys)
         lights = LIGHT * jnp.vstack([jnp.array([[1.0, 0.0, 0.0]]), drawn.reshape(-1, 3)])
-        return dataclasses.replace(super().trials(key, creature, settings), light=lights)
+        return dataclasses.replace(super().trials(key, creature, settings), goal=lights)
 
-    def aim(self, trial: Starts) -> jax.Array:
-        """See `Task`: place [3] of the light in m."""
-        assert trial.light is not None
-        return trial.qpos[:3] + trial.light
+    def goal(self, trial: Starts) -> jax.Array:
+        """Place [3] of the light in m; the trial has it from where the root starts."""
+        return jnp.asarray(trial.qpos[:3] + trial.goal)
 
-    def senses(self, aim: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
-        """See `Task`: direction [G, 3] of the light in the axes of each block."""
-        assert sensed.geom_rot is not None
-        there = aim - sensed.geom_pos
+    def observations(self, goal: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
+        """Direction [G, 3] of the light in the axes of each block."""
+        axes = own(sensed).geom_rot
+        assert axes is not None
+        there = goal - sensed.geom_pos
         there = there / jnp.sqrt(jnp.sum(there**2, axis=1, keepdims=True))
-        return {"light": jnp.sum(sensed.geom_rot * there[:, None], axis=2)}
+        return {"light": jnp.sum(axes * there[:, None], axis=2)}
 
     @override
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: jax.Array
+        self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: jax.Array
     ) -> Any:
-        after = super().update(tally, sensed, torque, standards, aim)
-        return dataclasses.replace(after, light=aim, since=standards)
+        after = super().update(stats, sensed, torque, params, goal)
+        return dataclasses.replace(after, light=goal, since=params)
 
     @override
-    def way(self, tally: Any) -> jax.Array:
+    def way(self, stats: Any) -> jax.Array:
         before, now = (
-            length((tally.light - place)[: self.axes]) for place in (tally.settled, tally.place)
+            length((stats.light - place)[: self.axes]) for place in (stats.settled, stats.place)
         )
         return before - now
 
-    def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
-        """See `Task`: also the time in s from which the way counted."""
-        return {**super().outcome(tally), "since": tally.since * self.step}
+    def outcome(self, stats: Any) -> Mapping[str, jax.Array]:
+        """Also the time in s from which the way counted."""
+        return {**super().outcome(stats), "since": stats.since * self.step}
 
 
 class FollowInWater(Following, Swim):
-    """See `Task`."""
+    """Implementation of `Task`."""
 
 
 class FollowOnLand(Following, Roam):
-    """See `Task`."""
+    """Implementation of `Task`."""
 
 
 def balanced(key: jax.Array, count: int, axes: int) -> jax.Array:

@@ -17,7 +17,7 @@ from mjxgait.tasks.modular.thresholds import FollowConfig
 
 
 class FollowCriteria(ModularCriteria):
-    """See `AcceptanceCriteria`. drag: 0 on land."""
+    """Implementation of `AcceptanceCriteria`. drag: 0 on land."""
 
     verdict = "it follows a light"
     verb = "follows"
@@ -37,19 +37,19 @@ class FollowCriteria(ModularCriteria):
         return Criterion(2, "follows", (nearer,))
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `ModularCriteria`: the criterion of swimming or of walking."""
+        """The criterion of swimming or of walking."""
         if self.drag:
             return (by_water(window, config.swim),)
         return (balanced(window, config.roam),)
 
     def done(self, window: Recording) -> float:
-        """See `ModularCriteria`: m/s of the approach."""
+        """Speed of the approach in m/s."""
         assert window.light is not None
         apart = (seen(window).middle - window.light)[:, : self.axes]
         return float(approach(apart, window.time_step))
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
-        """See `ModularCriteria`: for the light of the recording, not for all."""
+        """For the light of the recording, not for all."""
         way = champion.origin.get("nominal", {}).get("way", np.nan)
         return float(way / (seconds - self.since(champion, config)))
 
@@ -60,7 +60,7 @@ class FollowCriteria(ModularCriteria):
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `AcceptanceCriteria`: a light for each simulation without one, the nominal one ahead."""
+        """A light for each simulation without one, the nominal one ahead."""
         ahead = np.tile([1.0, 0.0, 0.0], (len(starts), 1))
         drawn = ahead if rng is None else rng.normal(size=(len(starts), 3))
         drawn[:, self.axes :] = 0.0
@@ -70,14 +70,14 @@ class FollowCriteria(ModularCriteria):
         )
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `AcceptanceCriteria`: those that approach as fast as criterion 2 requires, measured alike."""
+        """Simulations that approach as fast as criterion 2 requires, measured alike."""
         middle = counted(outcome.middle, outcome, config)
         apart = (middle - starts.light[:, None])[..., : self.axes]
         nearer = approach(apart, outcome.trajectory.time_step)
         return outcome.stayed_up & (nearer >= config.follow.speed)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """See `ModularCriteria`: the approach in m due in all seconds, made in those that count."""
+        """The approach in m due in all seconds, made in those that count."""
         return config.follow.speed * seconds
 
 

@@ -18,6 +18,7 @@ from typing_extensions import override
 
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
+from mjxgait.physics.batched_trees.tree import ModularSensed
 from mjxgait.tasks import base as protocol
 from mjxgait.tasks.base import FINISHED, ramp
 from mjxgait.tasks.modular.config import (
@@ -39,9 +40,15 @@ FASTEST_HINGE, FASTEST, FURTHEST = 20.0, 5.0, 0.08
 """rad/s, m/s, rad past a hinge's range."""
 
 
+def own(sensed: Sensed) -> ModularSensed:
+    """Return the quantities that only modular bodies have."""
+    assert isinstance(sensed.body, ModularSensed)
+    return sensed.body
+
+
 @pytree
-class Tally(protocol.Tally):
-    """See `protocol.Tally`.
+class EpisodeStats(protocol.EpisodeStats):
+    """Extension of `protocol.EpisodeStats`.
 
     settled, place: [3] m, centre of mass when counting began, and now.
     light: [3] m, its place. since: [] step from which the way counts. None without a light.
@@ -54,10 +61,13 @@ class Tally(protocol.Tally):
 
 
 class BlocksTask(PlainTask):
-    """See `Task`: the creature lies at rest, with bent joints in all trials but the first."""
+    """Implementation of `Task`.
+
+    The creature lies at rest, with bent joints in all trials but the first.
+    """
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`. The root is at the origin; growing the body puts it on the ground."""
+        """The root is at the origin; growing the body puts it on the ground."""
         count, joints = settings.starts, len(self.creature.joints.names)
         bent = settings.joint_noise * jax.random.uniform(key, (count, joints), minval=-1.0)
         bent = bent * (jnp.arange(count) > 0)[:, None]
@@ -73,19 +83,18 @@ class BlocksTask(PlainTask):
             damping=jnp.ones((count, joints)),
         )
 
-    def standards(self, settings: BlocksConfig) -> jax.Array:
-        """See `Task`: the first step [] that counts."""
+    def params(self, settings: BlocksConfig) -> jax.Array:
+        """The first step [] that counts."""
         return jnp.round(settings.settle / self.step).astype(jnp.int32)
 
     @override
-    def ended(self, sensed: Sensed, aim: object) -> jax.Array:
+    def ended(self, sensed: Sensed, goal: object) -> jax.Array:
         speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
         wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
-        assert sensed.past is not None
-        return jnp.where(wild | (sensed.past > FURTHEST), WILD, FINISHED)
+        return jnp.where(wild | (own(sensed).limit_excess > FURTHEST), WILD, FINISHED)
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
-        """See `Task`: the first term is a reward, all others are penalties.
+        """The first term is a reward, all others are penalties.
 
         The weight of the overlap grows over the generations.
         """
@@ -97,7 +106,7 @@ class BlocksTask(PlainTask):
 
 
 class GoingTask(BlocksTask):
-    """See `Task`: get as far as possible.
+    """Implementation of `Task`: get as far as possible.
 
     axes: number of world axes along which a way counts. dark: light of the empty statistics.
     """
@@ -106,9 +115,9 @@ class GoingTask(BlocksTask):
     axes: ClassVar[int] = 3
     dark: ClassVar[np.ndarray | None] = None
 
-    def way(self, tally: Tally) -> jax.Array:
+    def way(self, stats: EpisodeStats) -> jax.Array:
         """Straight-line distance [] in m from where counting began."""
-        return length((tally.place - tally.settled)[: self.axes])
+        return length((stats.place - stats.settled)[: self.axes])
 
     def begun(self) -> dict[str, Any]:
         """Empty statistics common to these tasks."""
@@ -124,24 +133,23 @@ class GoingTask(BlocksTask):
         }
 
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+        self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> Any:
-        """See `Task`: the place now, and when counting began."""
-        assert sensed.middle is not None
+        """The place now, and when counting began."""
         return dataclasses.replace(
-            tally,
-            steps=tally.steps + 1,
-            settled=jnp.where(tally.steps <= standards, sensed.middle, tally.settled),
-            place=sensed.middle,
+            stats,
+            steps=stats.steps + 1,
+            settled=jnp.where(stats.steps <= params, own(sensed).com, stats.settled),
+            place=own(sensed).com,
         )
 
-    def speed(self, tally: Tally, settings: BlocksConfig) -> jax.Array:
+    def speed(self, stats: EpisodeStats, settings: BlocksConfig) -> jax.Array:
         """Speed [] in m/s over the time that counts, even if the episode ended early."""
-        return self.way(tally) / jnp.maximum(self.horizon * self.step - settings.settle, self.step)
+        return self.way(stats) / jnp.maximum(self.horizon * self.step - settings.settle, self.step)
 
-    def outcome(self, tally: Tally) -> Mapping[str, jax.Array]:
-        """See `Task`: m from where counting began, and s until the end."""
-        return {"way": self.way(tally), "seconds": tally.steps * self.step}
+    def outcome(self, stats: EpisodeStats) -> Mapping[str, jax.Array]:
+        """Distance in m from where counting began, and s until the end."""
+        return {"way": self.way(stats), "seconds": stats.steps * self.step}
 
 
 def length(vector: jax.Array) -> jax.Array:
@@ -159,8 +167,8 @@ LITTLE = 1e-6
 
 
 @pytree
-class SwimTally(Tally):
-    """See `alive.Tally`.
+class SwimStats(EpisodeStats):
+    """Extension of `alive.EpisodeStats`.
 
     began: [3] kg·m/s, momentum of the body when counting began.
     given: [3] kg·m/s, from the water since then. exchanged: [] the same without directions.
@@ -174,55 +182,53 @@ class SwimTally(Tally):
 
 
 class Swim(GoingTask):
-    """See `Task`: in water, without a floor. The way is a straight line."""
+    """Implementation of `Task`: in water, without a floor. The way is a straight line."""
 
     Settings: ClassVar[type] = SwimConfig
     terms = tuple(field.name for field in dataclasses.fields(SwimWeights))
 
     @override
-    def init(self) -> SwimTally:
+    def init(self) -> SwimStats:
         nothing, nowhere = jnp.zeros(()), jnp.zeros(3)
-        return SwimTally(
+        return SwimStats(
             **self.begun(), began=nowhere, given=nowhere, exchanged=nothing, lacking=nothing
         )
 
     @override
     def update(
-        self, tally: SwimTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
-    ) -> SwimTally:
-        assert sensed.momentum is not None
-        assert sensed.washed is not None
+        self, stats: SwimStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
+    ) -> SwimStats:
         begins, momentum, push = (
-            tally.steps <= standards,
-            sensed.momentum,
-            sensed.washed * self.step,
+            stats.steps <= params,
+            own(sensed).momentum,
+            own(sensed).water_force * self.step,
         )
-        began = jnp.where(begins, momentum, tally.began)
-        given = jnp.where(begins, 0.0, tally.given)
+        began = jnp.where(begins, momentum, stats.began)
+        given = jnp.where(begins, 0.0, stats.given)
         lacking = jnp.where(
-            begins, 0.0, jnp.maximum(tally.lacking, length(momentum - began - given))
+            begins, 0.0, jnp.maximum(stats.lacking, length(momentum - began - given))
         )
         return dataclasses.replace(
-            super().update(tally, sensed, torque, standards, aim),
+            super().update(stats, sensed, torque, params, goal),
             began=began,
             given=given + push,
-            exchanged=jnp.where(begins, 0.0, tally.exchanged) + length(push),
+            exchanged=jnp.where(begins, 0.0, stats.exchanged) + length(push),
             lacking=lacking,
         )
 
-    def judge(self, tally: SwimTally, settings: SwimConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: the speed; its loss by overlap; the loss of the rest by foreign momentum."""
-        speed = self.speed(tally, settings)
+    def evaluate(self, stats: SwimStats, settings: SwimConfig) -> Mapping[str, jax.Array]:
+        """The speed; its loss by overlap; the loss of the rest by foreign momentum."""
+        speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
-        inside = lost(tally.overlap / settings.overlap)
-        share = tally.lacking / jnp.maximum(tally.exchanged, LITTLE)
+        inside = lost(stats.overlap / settings.overlap)
+        share = stats.lacking / jnp.maximum(stats.exchanged, LITTLE)
         elsewhere = (1 - inside) * lost(share / settings.elsewhere)
         return {"speed": speed, "overlap": earned * inside, "elsewhere": earned * elsewhere}
 
 
 @pytree
-class RoamTally(Tally):
-    """See `alive.Tally`.
+class RoamStats(EpisodeStats):
+    """Extension of `alive.EpisodeStats`.
 
     upwards: [3] direction in the root's axes that was up when counting began.
     upright: [] least cosine of its angle with the world's up axis since then.
@@ -233,40 +239,39 @@ class RoamTally(Tally):
 
 
 class Roam(GoingTask):
-    """See `Task`: on land. The way is a straight, level line."""
+    """Implementation of `Task`: on land. The way is a straight, level line."""
 
     Settings: ClassVar[type] = RoamConfig
     terms = tuple(field.name for field in dataclasses.fields(RoamWeights))
     axes = 2
 
     @override
-    def init(self) -> RoamTally:
-        return RoamTally(**self.begun(), upwards=jnp.zeros(3), upright=jnp.ones(()))
+    def init(self) -> RoamStats:
+        return RoamStats(**self.begun(), upwards=jnp.zeros(3), upright=jnp.ones(()))
 
     @override
     def update(
-        self, tally: RoamTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
-    ) -> RoamTally:
-        assert sensed.sunk is not None
-        begins = tally.steps <= standards
-        upwards = jnp.where(begins, sensed.trunk_rot[2], tally.upwards)
+        self, stats: RoamStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
+    ) -> RoamStats:
+        begins = stats.steps <= params
+        upwards = jnp.where(begins, sensed.trunk_rot[2], stats.upwards)
         upright = jnp.sum(sensed.trunk_rot[2] * upwards)
         return dataclasses.replace(
-            super().update(tally, sensed, torque, standards, aim),
-            overlap=jnp.where(begins, tally.overlap, jnp.maximum(tally.overlap, sensed.sunk)),
+            super().update(stats, sensed, torque, params, goal),
+            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, own(sensed).depth)),
             upwards=upwards,
-            upright=jnp.where(begins, 1.0, jnp.minimum(tally.upright, upright)),
+            upright=jnp.where(begins, 1.0, jnp.minimum(stats.upright, upright)),
         )
 
-    def judge(self, tally: RoamTally, settings: RoamConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: the speed; its loss by overlap; the loss of the rest by tipping over.
+    def evaluate(self, stats: RoamStats, settings: RoamConfig) -> Mapping[str, jax.Array]:
+        """The speed; its loss by overlap; the loss of the rest by tipping over.
 
         Blocks overlap each other or the ground.
         """
-        speed = self.speed(tally, settings)
+        speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
-        inside = lost(tally.overlap / settings.overlap)
-        tilt = jnp.degrees(jnp.arccos(jnp.clip(tally.upright, -1.0, 1.0)))
+        inside = lost(stats.overlap / settings.overlap)
+        tilt = jnp.degrees(jnp.arccos(jnp.clip(stats.upright, -1.0, 1.0)))
         tipped = (1 - inside) * lost(tilt / settings.tilt)
         return {"speed": speed, "overlap": earned * inside, "balance": earned * tipped}
 
@@ -288,54 +293,56 @@ in the trial that it was selected by.
 
 
 @pytree
-class JumpTally(protocol.Tally):
-    """See `protocol.Tally`. heights: [SPANS] m, greatest height of the lowest part in each."""
+class JumpStats(protocol.EpisodeStats):
+    """Extension of `protocol.EpisodeStats`.
+
+    heights: [SPANS] m, greatest height of the lowest part in each.
+    """
 
     heights: jax.Array
 
 
 class Jump(BlocksTask):
-    """See `Task`: on land."""
+    """Implementation of `Task`: on land."""
 
     Settings: ClassVar[type] = JumpConfig
     terms = tuple(field.name for field in dataclasses.fields(JumpWeights))
     outcomes = ("height", "seconds")
 
     @override
-    def init(self) -> JumpTally:
+    def init(self) -> JumpStats:
         none = jnp.zeros((), jnp.int32)
-        return JumpTally(none, none, jnp.zeros(()), jnp.zeros(SPANS))
+        return JumpStats(none, none, jnp.zeros(()), jnp.zeros(SPANS))
 
     @override
     def update(
-        self, tally: JumpTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: object
-    ) -> JumpTally:
-        assert sensed.sunk is not None
-        begins, low = tally.steps <= standards, jnp.min(sensed.geom_low)
-        span = SPANS * (tally.steps - standards) // jnp.maximum(self.horizon - standards, 1)
+        self, stats: JumpStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: object
+    ) -> JumpStats:
+        begins, low = stats.steps <= params, jnp.min(sensed.geom_low)
+        span = SPANS * (stats.steps - params) // jnp.maximum(self.horizon - params, 1)
         now = (jnp.arange(SPANS) == span) & ~begins
         return dataclasses.replace(
-            tally,
-            steps=tally.steps + 1,
-            overlap=jnp.where(begins, tally.overlap, jnp.maximum(tally.overlap, sensed.sunk)),
-            heights=jnp.where(now, jnp.maximum(tally.heights, low), tally.heights),
+            stats,
+            steps=stats.steps + 1,
+            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, own(sensed).depth)),
+            heights=jnp.where(now, jnp.maximum(stats.heights, low), stats.heights),
         )
 
-    def judge(self, tally: JumpTally, settings: JumpConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: m; its loss by overlap; the loss of the rest by an early end.
+    def evaluate(self, stats: JumpStats, settings: JumpConfig) -> Mapping[str, jax.Array]:
+        """Height in m; its loss by overlap; the loss of the rest by an early end.
 
         Blocks overlap each other or the ground. An early end costs, because the wildest leap is the
         last.
         """
-        height = jnp.mean(tally.heights)
-        inside = lost((tally.overlap / settings.overlap) ** SHARPNESS)
-        lived = (1 - inside) * tally.steps / self.horizon
+        height = jnp.mean(stats.heights)
+        inside = lost((stats.overlap / settings.overlap) ** SHARPNESS)
+        lived = (1 - inside) * stats.steps / self.horizon
         return {
             "height": height,
             "overlap": height * inside,
             "wild": height * (1 - inside - lived),
         }
 
-    def outcome(self, tally: JumpTally) -> Mapping[str, jax.Array]:
-        """See `Task`: m, and s until the end."""
-        return {"height": jnp.mean(tally.heights), "seconds": tally.steps * self.step}
+    def outcome(self, stats: JumpStats) -> Mapping[str, jax.Array]:
+        """Height in m, and s until the end."""
+        return {"height": jnp.mean(stats.heights), "seconds": stats.steps * self.step}

@@ -21,7 +21,7 @@ AWAY = 2.0
 
 
 class TurnCriteria(PlainCriteria):
-    """See `AcceptanceCriteria`: stays up, and turns on the spot without vibrating."""
+    """Implementation of `AcceptanceCriteria`: stays up, and turns on the spot without vibrating."""
 
     verdict = "it turns on the spot"
 

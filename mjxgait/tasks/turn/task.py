@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from typing_extensions import override
 
 from mjxgait.config.tables import STRICT, Positive
-from mjxgait.tasks.base import Tally, positive_work
+from mjxgait.tasks.base import EpisodeStats, crossed, positive_work
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.types import Sensed, pytree
 
@@ -27,7 +27,7 @@ class TurnSettings:
 
 
 @pytree
-class TurnTally(Tally):
+class TurnStats(EpisodeStats):
     """Statistics of an episode.
 
     turned: [] rad to the left. work: [] J of the joints. away: [] m s, the distance from the start
@@ -49,13 +49,14 @@ class Turn(PlainTask):
         "turned": 3.0,
         "away": -1.0,
         "work": -0.05,
+        "overlap": -4.0,
     }
     outcomes = ("seconds", "turned", "away")
 
     @override
-    def init(self) -> TurnTally:
+    def init(self) -> TurnStats:
         none, zero = jnp.zeros((), jnp.int32), jnp.zeros(())
-        return TurnTally(
+        return TurnStats(
             steps=none,
             reason=none,
             overlap=zero,
@@ -67,36 +68,37 @@ class Turn(PlainTask):
 
     @override
     def update(
-        self, tally: TurnTally, sensed: Sensed, torque: jax.Array, standards: object, aim: object
-    ) -> TurnTally:
+        self, stats: TurnStats, sensed: Sensed, torque: jax.Array, params: object, goal: object
+    ) -> TurnStats:
         place = sensed.trunk_pos[:2]
-        start = jnp.where(tally.steps == 0, place, tally.start)
+        start = jnp.where(stats.steps == 0, place, stats.start)
         return dataclasses.replace(
-            tally,
-            steps=tally.steps + 1,
-            turned=tally.turned + sensed.trunk_angvel[2] * self.step,
-            work=tally.work + positive_work(torque, sensed, self.step),
-            away=tally.away + jnp.linalg.norm(place - start) * self.step,
+            stats,
+            steps=stats.steps + 1,
+            turned=stats.turned + sensed.trunk_angvel[2] * self.step,
+            work=stats.work + positive_work(torque, sensed, self.step),
+            away=stats.away + jnp.linalg.norm(place - start) * self.step,
             start=start,
         )
 
     @override
-    def judge(self, tally: TurnTally, settings: TurnSettings) -> Mapping[str, jax.Array]:
+    def evaluate(self, stats: TurnStats, settings: TurnSettings) -> Mapping[str, jax.Array]:
         seconds, frame = self.horizon * self.step, self.creature.frame
-        rate = jnp.degrees(tally.turned) / seconds
+        rate = jnp.degrees(stats.turned) / seconds
         weight_lifted = frame.mass * 9.81 * frame.hip_height * seconds
         return {
-            "alive": tally.steps / self.horizon,
+            "alive": stats.steps / self.horizon,
             "turned": jnp.clip(rate / settings.rate, -1.0, 1.0),
-            "away": tally.away / (frame.hip_height * seconds),
-            "work": tally.work / weight_lifted,
+            "away": stats.away / (frame.hip_height * seconds),
+            "work": stats.work / weight_lifted,
+            "overlap": crossed(self.creature, stats.overlap),
         }
 
     @override
-    def outcome(self, tally: TurnTally) -> Mapping[str, jax.Array]:
-        seconds = tally.steps * self.step
+    def outcome(self, stats: TurnStats) -> Mapping[str, jax.Array]:
+        seconds = stats.steps * self.step
         return {
             "seconds": seconds,
-            "turned": tally.turned,
-            "away": tally.away / jnp.maximum(seconds, self.step),
+            "turned": stats.turned,
+            "away": stats.away / jnp.maximum(seconds, self.step),
         }

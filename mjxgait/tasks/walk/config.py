@@ -17,7 +17,7 @@ from mjxgait.tasks.walk.gaits import AUTO, check_gait
 
 LIKENESS = ("stride", "duty_factor", "reach", "pitch")
 """Measures that compare a walk with an animal's."""
-WISHES = ("speed", "gait", "turn", "steer", "height", "bounce", "sway", *LIKENESS)
+TARGETS = ("speed", "gait", "turn", "steer", "height", "bounce", "sway", *LIKENESS)
 GaitText = Annotated[str, pydantic.AfterValidator(check_gait)]
 
 
@@ -74,7 +74,7 @@ class Weights:
 
 
 @dataclasses.dataclass(frozen=True)
-class WishWeights:
+class TargetWeights:
     """Largest cost of missing each target (mjxgait/tasks/walk/fitness.py).
 
     Attributes:
@@ -102,7 +102,7 @@ class WishWeights:
 
 
 @dataclasses.dataclass(frozen=True)
-class WishConfig:
+class TargetConfig:
     """Walk targets (docs/guide/gaits.md); a key that is not given is free.
 
     Attributes:
@@ -134,24 +134,24 @@ class WishConfig:
     duty_factor: Positive | None = None
     reach: NonNegative | None = None
     pitch: Finite | None = None
-    weights: WishWeights = dataclasses.field(default_factory=WishWeights)
+    weights: TargetWeights = dataclasses.field(default_factory=TargetWeights)
 
     def __post_init__(self) -> None:
         if self.turn is not None and self.steer is not None:
             raise ValueError("turn and steer exclude each other; give one")
 
     @property
-    def asked(self) -> tuple[str, ...]:
+    def requested(self) -> tuple[str, ...]:
         """Names of the targets that are set."""
-        values = {name: getattr(self, name) for name in WISHES}
+        values = {name: getattr(self, name) for name in TARGETS}
         # A traced value cannot be compared.
         free = [n for n, v in values.items() if v is None or (isinstance(v, str) and v == AUTO)]
-        return tuple(name for name in WISHES if name not in free)
+        return tuple(name for name in TARGETS if name not in free)
 
     @property
     def table(self) -> dict[str, float | str]:
         """Targets that are set, by name."""
-        return {name: getattr(self, name) for name in self.asked}
+        return {name: getattr(self, name) for name in self.requested}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -181,5 +181,5 @@ class WalkConfig:
     contact: Annotated[NonNegative, SHAPE] = 0.002
     hardening: Annotated[Whole, SHAPE] = 0
     style_ramp: Whole = 0
-    wish: WishConfig = dataclasses.field(default_factory=WishConfig)
+    wish: TargetConfig = dataclasses.field(default_factory=TargetConfig)
     weights: Weights = dataclasses.field(default_factory=Weights)

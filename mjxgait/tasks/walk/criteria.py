@@ -52,12 +52,12 @@ from mjxgait.tasks.walk.gaits import gait_of, transition
 from mjxgait.tasks.walk.target_criteria import (
     Wish,
     as_asked,
+    commanded_heading,
     draw_commands,
     following,
     heading_off,
     posture,
     steered,
-    told_heading,
     unrolled,
 )
 
@@ -73,7 +73,7 @@ The range allows for standing at the start.
 
 
 class WalkCriteria(StaysUp):
-    """See `AcceptanceCriteria`: steady forward strides, like those of an animal."""
+    """Implementation of `AcceptanceCriteria`: steady forward strides, like those of an animal."""
 
     verdict = "it walks"
     revision = 1
@@ -83,12 +83,12 @@ class WalkCriteria(StaysUp):
         self.wish = dict(wish or {})
 
     @override
-    def asked(self, wish: Wish) -> "WalkCriteria":
+    def with_targets(self, wish: Wish) -> "WalkCriteria":
         return WalkCriteria(wish) if wish else self
 
     @override
-    def told(self, steps: int, time_step: float) -> np.ndarray | None:
-        return told_heading(self.wish, steps, time_step)
+    def commanded_heading(self, steps: int, time_step: float) -> np.ndarray | None:
+        return commanded_heading(self.wish, steps, time_step)
 
     @override
     def commands(
@@ -99,26 +99,26 @@ class WalkCriteria(StaysUp):
         return draw_commands(self.wish["steer"], config.wishes.commands, steps, time_step, rng)
 
     def obeyed(
-        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+        self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: 11."""
-        return (steered(outcome, told, config.wishes),)
+        """Evaluate criterion 11."""
+        return (steered(outcome, commanded, config.wishes),)
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `AcceptanceCriteria`: all but 4 and 5, and 10 if targets are set."""
+        """Evaluate all criteria but 4 and 5, and 10 if targets are set."""
         config = following(config, self.wish, whole.dimensions)
         whole, halved = (unrolled(recording, self.wish) for recording in (whole, halved))
         window = whole.window(config.warmup)
-        wishes = (as_asked(window, self.wish, config),) if self.wish else ()
+        targets = (as_asked(window, self.wish, config),) if self.wish else ()
         return (
             *basic(whole, config),
             half_step(whole, halved, config),
             gait(window, config.gait, self.wish),
             physics(window, config.physics),
             parts(window, config.parts),
-            *wishes,
+            *targets,
         )
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
@@ -134,7 +134,7 @@ class WalkCriteria(StaysUp):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `AcceptanceCriteria`: no early end, and clearly faster than required, or near a target speed."""
+        """No early end, and clearly faster than required, or near a target speed."""
         lived = to_the_end(outcome, seconds, creature)
         if "speed" in self.wish:
             came = outcome["forward"] / seconds / self.wish["speed"]

@@ -12,9 +12,9 @@ import jax.numpy as jnp
 
 from mjxgait.creature.body import Body
 from mjxgait.tasks.base import Reason, cost_of_transport, crossed, ramped
-from mjxgait.tasks.walk.config import LIKENESS, WalkConfig, Weights, WishConfig
+from mjxgait.tasks.walk.config import LIKENESS, TargetConfig, WalkConfig, Weights
 from mjxgait.tasks.walk.gaits import GRAVITY, animal_duty, animal_stride, most_strides, stride_limit
-from mjxgait.tasks.walk.stats import Tally, WishTally, gait_missed
+from mjxgait.tasks.walk.stats import EpisodeStats, TargetStats, gait_missed
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
@@ -43,7 +43,7 @@ BEYOND = 0.02
 
 
 def fitness_terms(
-    creature: Body, config: WalkConfig, step: float, horizon: int, tally: Tally
+    creature: Body, config: WalkConfig, step: float, horizon: int, stats: EpisodeStats
 ) -> dict[str, jax.Array]:
     """Return the terms [] of one episode, each without unit and before its weight.
 
@@ -53,11 +53,11 @@ def fitness_terms(
     Args:
       step: s. horizon: T, steps of a full episode.
     """
-    values, enough = plain_terms(creature, config, step, horizon, tally)
+    values, enough = plain_terms(creature, config, step, horizon, stats)
     length = creature.frame.body_length
     # Style counts only as far as there is a walk: attempts to learn walking must not be punished.
     walked = jnp.where(
-        jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0
+        jnp.isfinite(enough), jnp.clip(stats.forward / length / enough, 0.0, 1.0), 1.0
     )
     values["alive"] *= STANDING + (1 - STANDING) * walked
     return {name: values[name] * (walked if name in STYLE else 1.0) for name in TERMS}
@@ -69,46 +69,46 @@ def terms_under(weights: Weights) -> tuple[str, ...]:
 
 
 def plain_terms(
-    creature: Body, config: WalkConfig, step: float, horizon: int, tally: Tally
+    creature: Body, config: WalkConfig, step: float, horizon: int, stats: EpisodeStats
 ) -> tuple[dict[str, jax.Array], jax.Array]:
     """Return the terms with style in full, and the body lengths [] up to which farther is better.
 
     Style is not scaled here, however short the walk.
     """
-    lived = jnp.maximum(tally.steps, 1)
+    lived = jnp.maximum(stats.steps, 1)
     length = creature.frame.body_length
-    moved = jnp.maximum(tally.forward, 0.25 * length)
-    rate = jnp.mean(tally.swings) / lived / step
+    moved = jnp.maximum(stats.forward, 0.25 * length)
+    rate = jnp.mean(stats.swings) / lived / step
     # Strides of the median foot; a foot with fewer swings did not leave the floor.
-    strides = jnp.sort(tally.swings)[tally.swings.shape[0] // 2]
-    dragged = tally.shortfall + jnp.maximum(strides - tally.swings, 0.0)
-    low_feet = jnp.mean(dragged / jnp.maximum(jnp.maximum(tally.swings, strides), 1.0))
-    duty = tally.contact / lived
-    second_half = tally.forward - tally.forward_half
+    strides = jnp.sort(stats.swings)[stats.swings.shape[0] // 2]
+    dragged = stats.shortfall + jnp.maximum(strides - stats.swings, 0.0)
+    low_feet = jnp.mean(dragged / jnp.maximum(jnp.maximum(stats.swings, strides), 1.0))
+    duty = stats.contact / lived
+    second_half = stats.forward - stats.forward_half
     enough = _enough(config.speed, horizon * step)
     values = {
-        "distance": _counted(tally.forward / length, enough),
-        "alive": tally.steps / horizon,
-        "drift": jnp.abs(tally.left) / length + jnp.abs(jnp.sin(0.5 * tally.heading)),
-        "fade": jnp.maximum(tally.forward_half - second_half, 0.0) / length,
-        "slip": jnp.max(tally.slip) / moved,
+        "distance": _counted(stats.forward / length, enough),
+        "alive": stats.steps / horizon,
+        "drift": jnp.abs(stats.left) / length + jnp.abs(jnp.sin(0.5 * stats.heading)),
+        "fade": jnp.maximum(stats.forward_half - second_half, 0.0) / length,
+        "slip": jnp.max(stats.slip) / moved,
         "clearance": jnp.where(strides > 0, low_feet, 1.0),
         "frequency": jnp.maximum(rate / stride_limit(creature.frame.mass) - config.frequency, 0.0),
         "duty": jnp.max(jnp.maximum(duty - 0.8, 0.0) + jnp.maximum(0.25 - duty, 0.0)) / 0.2,
-        "airborne": tally.airborne / lived,
-        "patter": jnp.mean(_patter(tally)),
+        "airborne": stats.airborne / lived,
+        "patter": jnp.mean(_patter(stats)),
         "foot_height": jnp.maximum(
-            tally.foot_height / lived / creature.frame.hip_height - 0.25, 0.0
+            stats.foot_height / lived / creature.frame.hip_height - 0.25, 0.0
         ),
-        "tilt": tally.tilt / lived,
-        "wobble": jnp.sqrt(tally.wobble / lived + 1e-12),
-        "touch": tally.touch / lived,
-        "energy": cost_of_transport(creature, tally.work, moved),
-        "saturation": tally.saturation / lived,
-        "limits": tally.limits / lived,
-        "overlap": crossed(creature, tally.overlap),
-        "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
-        "foot_speed": jnp.maximum(_in_hip_speeds(creature, tally.foot_speed) - WHIPPING, 0.0),
+        "tilt": stats.tilt / lived,
+        "wobble": jnp.sqrt(stats.wobble / lived + 1e-12),
+        "touch": stats.touch / lived,
+        "energy": cost_of_transport(creature, stats.work, moved),
+        "saturation": stats.saturation / lived,
+        "limits": stats.limits / lived,
+        "overlap": crossed(creature, stats.overlap),
+        "fall": jnp.where(stats.reason == Reason.FINISHED, 0.0, 1.0),
+        "foot_speed": jnp.maximum(_in_hip_speeds(creature, stats.foot_speed) - WHIPPING, 0.0),
     }
     return values, enough
 
@@ -118,13 +118,13 @@ def _in_hip_speeds(creature: Body, speed: jax.Array) -> jax.Array:
     return speed / (GRAVITY * creature.frame.hip_height) ** 0.5
 
 
-def _patter(tally: Tally) -> jax.Array:
+def _patter(stats: EpisodeStats) -> jax.Array:
     """Contact flicker [F] of each foot, 0 to 1.
 
     The first touchdown and those that end a swing do not count.
     """
-    strides = jnp.maximum(tally.swings, 1.0)
-    repeats = jnp.maximum(tally.touchdowns - 1.0 - tally.swings, 0.0) / strides
+    strides = jnp.maximum(stats.swings, 1.0)
+    repeats = jnp.maximum(stats.touchdowns - 1.0 - stats.swings, 0.0) / strides
     return repeats / (repeats + PATTER)
 
 
@@ -169,21 +169,21 @@ UNLIKE = {"stride": 0.15, "duty_factor": 0.15, "reach": 0.1, "pitch": 5.0}
 
 
 def wished_terms(
-    creature: Body, config: WalkConfig, step: float, horizon: int, tally: WishTally
+    creature: Body, config: WalkConfig, step: float, horizon: int, stats: TargetStats
 ) -> dict[str, jax.Array]:
     """Return the terms [] of one episode; the module docstring describes their weighted sum."""
     wish, seconds = config.wish, horizon * step
     length = creature.frame.body_length
     wanted = wanted_speed(creature, config) * seconds / length
-    values, _ = plain_terms(creature, config, step, horizon, tally)
-    values |= missed(creature, wish, step, horizon, tally)
-    values["frequency"] = hasty(creature, config, step, tally)
+    values, _ = plain_terms(creature, config, step, horizon, stats)
+    values |= missed(creature, wish, step, horizon, stats)
+    values["frequency"] = hasty(creature, config, step, stats)
     # Errors count per distance, not per episode: a slow walk covers less.
     longer = WORTH / wanted
-    aside = jnp.abs(tally.left) / length
+    aside = jnp.abs(stats.left) / length
     values["drift"] = values["drift"] - aside + longer * aside
     values["fade"] = longer * values["fade"]
-    share = jnp.minimum(tally.forward / length / (STARTING * wanted), 1.0)
+    share = jnp.minimum(stats.forward / length / (STARTING * wanted), 1.0)
     walked = jnp.maximum(share, 0.0) * values["alive"]
     values["distance"] = WORTH * jnp.where(share > 0, walked, share)
     values["alive"] = walked
@@ -203,13 +203,13 @@ def wanted_speed(creature: Body, config: WalkConfig) -> jax.Array | float:
     return jnp.where(lengths > 0, lengths, usual) * creature.frame.body_length
 
 
-def hasty(creature: Body, config: WalkConfig, step: float, tally: WishTally) -> jax.Array:
+def hasty(creature: Body, config: WalkConfig, step: float, stats: TargetStats) -> jax.Array:
     """Relative excess [] of the stride frequency over its limit.
 
     The limit is that of a walk without targets. A target speed also sets one: the frequency at half
     of an animal's stride length.
     """
-    rate = jnp.mean(tally.swings) / jnp.maximum(tally.steps, 1) / step
+    rate = jnp.mean(stats.swings) / jnp.maximum(stats.steps, 1) / step
     most = jnp.asarray(stride_limit(creature.frame.mass))
     if config.wish.speed is not None:
         most = jnp.minimum(most, most_strides(config.wish.speed, creature.frame.hip_height))
@@ -217,65 +217,65 @@ def hasty(creature: Body, config: WalkConfig, step: float, tally: WishTally) -> 
 
 
 def missed(
-    creature: Body, wish: WishConfig, step: float, horizon: int, tally: WishTally
+    creature: Body, wish: TargetConfig, step: float, horizon: int, stats: TargetStats
 ) -> dict[str, jax.Array]:
     """Error [] of each target that is set, from 0 to 1; turns already count in the distance."""
-    lived, frame = jnp.maximum(tally.steps, 1), creature.frame
+    lived, frame = jnp.maximum(stats.steps, 1), creature.frame
     found: dict[str, jax.Array] = {}
     if wish.speed is not None:
-        found["speed"] = _half_at(NEAR, steady_speed(step, horizon, tally) / wish.speed - 1.0)
-    if "gait" in wish.asked:
+        found["speed"] = _half_at(NEAR, steady_speed(step, horizon, stats) / wish.speed - 1.0)
+    if "gait" in wish.requested:
         stations = creature.feet.stations
-        found["gait"] = gait_missed(wish.gait, stations, tally.falls, tally.contact / lived)
-    height = tally.height / lived
+        found["gait"] = gait_missed(wish.gait, stations, stats.falls, stats.contact / lived)
+    height = stats.height / lived
     if wish.height is not None:
         off = height / frame.stand_height - wish.height
         found["height"] = _half_at(ROUGH["height"], off)
     if wish.bounce is not None:
-        variance = jnp.maximum(tally.height_squared / lived - height**2, 1e-12)
+        variance = jnp.maximum(stats.height_squared / lived - height**2, 1e-12)
         off = jnp.sqrt(variance) / frame.hip_height - wish.bounce
         found["bounce"] = _half_at(ROUGH["bounce"], off)
     if wish.sway is not None:
-        rolls = jnp.degrees(jnp.sqrt(tally.roll_squared / lived + 1e-12))
+        rolls = jnp.degrees(jnp.sqrt(stats.roll_squared / lived + 1e-12))
         found["sway"] = _half_at(ROUGH["sway"], rolls - wish.sway)
-    if set(LIKENESS) & set(wish.asked):
-        own = likeness(creature, step, horizon, tally)
-        likes = [name for name in LIKENESS if name in wish.asked]
+    if set(LIKENESS) & set(wish.requested):
+        own = likeness(creature, step, horizon, stats)
+        likes = [name for name in LIKENESS if name in wish.requested]
         off = {name: (own[name] - getattr(wish, name)) / UNLIKE[name] for name in likes}
         # Animals differ too, so a small error costs next to nothing.
         found |= {name: _half_at(1.0, away**2) for name, away in off.items()}
     return found
 
 
-def likeness(creature: Body, step: float, horizon: int, tally: WishTally) -> dict[str, jax.Array]:
+def likeness(creature: Body, step: float, horizon: int, stats: TargetStats) -> dict[str, jax.Array]:
     """Compare a walk with an animal's: each measure [] in the unit of its target.
 
     Certification measures the same (`certification.likeness`).
     """
-    lived, hip = jnp.maximum(tally.steps, 1), creature.frame.hip_height
-    speed = jnp.maximum(steady_speed(step, horizon, tally), SLOW)
-    swings = jnp.sort(tally.swings)[tally.swings.shape[0] // 2]
+    lived, hip = jnp.maximum(stats.steps, 1), creature.frame.hip_height
+    speed = jnp.maximum(steady_speed(step, horizon, stats), SLOW)
+    swings = jnp.sort(stats.swings)[stats.swings.shape[0] // 2]
     stride = speed * lived * step / jnp.maximum(swings, 1.0)
-    stood = tally.reach / jnp.maximum(tally.contact, 1.0)
+    stood = stats.reach / jnp.maximum(stats.contact, 1.0)
     return {
         "stride": stride / animal_stride(speed, hip),
-        "duty_factor": jnp.mean(tally.contact) / lived / animal_duty(speed, hip),
+        "duty_factor": jnp.mean(stats.contact) / lived / animal_duty(speed, hip),
         "reach": jnp.mean(jnp.abs(stood)) / hip,
-        "pitch": -jnp.degrees(tally.pitch / lived),
+        "pitch": -jnp.degrees(stats.pitch / lived),
     }
 
 
-def steady_speed(step: float, horizon: int, tally: Tally) -> jax.Array:
+def steady_speed(step: float, horizon: int, stats: EpisodeStats) -> jax.Array:
     """Speed [] in m/s over the second half of the episode, or over all of a shorter one."""
     half = horizon // 2
-    late = tally.steps > half
-    way = jnp.where(late, tally.forward - tally.forward_half, tally.forward)
-    return way / (jnp.maximum(jnp.where(late, tally.steps - half, tally.steps), 1) * step)
+    late = stats.steps > half
+    way = jnp.where(late, stats.forward - stats.forward_half, stats.forward)
+    return way / (jnp.maximum(jnp.where(late, stats.steps - half, stats.steps), 1) * step)
 
 
-def wish_weights(wish: WishConfig) -> dict[str, float]:
+def target_weights(wish: TargetConfig) -> dict[str, float]:
     """Weights of the targets that are set and have a term of their own."""
-    return {n: getattr(wish.weights, n) for n in wish.asked if hasattr(wish.weights, n)}
+    return {n: getattr(wish.weights, n) for n in wish.requested if hasattr(wish.weights, n)}
 
 
 def _half_at(near: float, off: jax.Array) -> jax.Array:
@@ -285,7 +285,7 @@ def _half_at(near: float, off: jax.Array) -> jax.Array:
 
 def _shared(values: dict[str, jax.Array], config: WalkConfig) -> dict[str, jax.Array]:
     """Scale the penalties down so that they cost no more than was earned."""
-    weights = {name: getattr(config.weights, name) for name in TERMS} | wish_weights(config.wish)
+    weights = {name: getattr(config.weights, name) for name in TERMS} | target_weights(config.wish)
     costs = [weights[name] * value for name, value in values.items() if name not in REWARDS]
     cost = jnp.maximum(sum(costs, start=jnp.zeros(())), 0.0)
     earned = sum(weights[name] * jnp.maximum(values[name], 0.0) for name in REWARDS)

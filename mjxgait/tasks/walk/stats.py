@@ -41,7 +41,7 @@ PER_FOOT = (
 
 
 @pytree
-class Tally(protocol.Tally):
+class EpisodeStats(protocol.EpisodeStats):
     """Sums over the steps of an episode until it ends. `F` counts feet here, not their geoms.
 
     reason: a `falls.Reason`.
@@ -90,7 +90,7 @@ class Tally(protocol.Tally):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Judge:
+class StatsRecorder:
     """Accumulator of the episode statistics of one creature.
 
     half_time: step. contact: m above the floor below which a foot is down.
@@ -101,21 +101,21 @@ class Judge:
     half_time: int
     contact: float = CONTACT_GAP
 
-    def init(self) -> Tally:
+    def init(self) -> EpisodeStats:
         """Return the empty statistics."""
         feet = len(self.creature.feet.names)
-        values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
+        values = {field.name: jnp.zeros(()) for field in dataclasses.fields(EpisodeStats)}
         counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason")}
         per_foot = {name: jnp.zeros(feet) for name in PER_FOOT}
-        return Tally(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
+        return EpisodeStats(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
 
     def update(
         self,
-        tally: Tally,
+        stats: EpisodeStats,
         sensed: Sensed,
         torque: jax.Array,
         clearance: jax.Array,
-    ) -> Tally:
+    ) -> EpisodeStats:
         """Return the statistics after one more step.
 
         Args:
@@ -130,47 +130,47 @@ class Judge:
         down = (low < self.contact).astype(jnp.float32)
         # A foot that bears weight penetrates the floor a little.
         loaded = (low < 0.0).astype(jnp.float32)
-        peak = jnp.maximum(tally.peak, low)
+        peak = jnp.maximum(stats.peak, low)
         missing = jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0)
-        went = jnp.linalg.norm(pos - tally.foot_pos, axis=1)
-        slid = went * down * tally.foot_down
-        speed = jnp.where(tally.steps > 0, jnp.max(went) / self.step, 0.0)
+        went = jnp.linalg.norm(pos - stats.foot_pos, axis=1)
+        slid = went * down * stats.foot_down
+        speed = jnp.where(stats.steps > 0, jnp.max(went) / self.step, 0.0)
         rise = SWING * creature.frame.hip_height
-        swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, tally.swinging))
-        fallen = jnp.maximum(tally.swinging - swinging, 0.0)
+        swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, stats.swinging))
+        fallen = jnp.maximum(stats.swinging - swinging, 0.0)
         outside = (sensed.joint_pos < creature.joints.pose_low.astype(np.float32)) | (
             sensed.joint_pos > creature.joints.pose_high.astype(np.float32)
         )
-        steps = tally.steps + 1
+        steps = stats.steps + 1
         forward = moved @ start_forward
-        return Tally(
+        return EpisodeStats(
             steps=steps,
-            reason=tally.reason,
+            reason=stats.reason,
             forward=forward,
             left=moved @ start_left,
-            forward_half=jnp.where(steps <= self.half_time, forward, tally.forward_half),
+            forward_half=jnp.where(steps <= self.half_time, forward, stats.forward_half),
             heading=jnp.arctan2(forward_axis @ start_left, forward_axis @ start_forward),
-            swings=tally.swings + fallen,
+            swings=stats.swings + fallen,
             swinging=swinging,
-            shortfall=tally.shortfall + fallen * missing,
+            shortfall=stats.shortfall + fallen * missing,
             peak=jnp.where(fallen > 0, low, peak),
             loaded=loaded,
-            touchdowns=tally.touchdowns + loaded * (1.0 - tally.loaded),
-            contact=tally.contact + down,
-            slip=tally.slip + slid,
-            airborne=tally.airborne + (jnp.max(down) == 0.0),
-            foot_height=tally.foot_height + jnp.mean(low),
-            foot_speed=jnp.maximum(tally.foot_speed, speed),
+            touchdowns=stats.touchdowns + loaded * (1.0 - stats.loaded),
+            contact=stats.contact + down,
+            slip=stats.slip + slid,
+            airborne=stats.airborne + (jnp.max(down) == 0.0),
+            foot_height=stats.foot_height + jnp.mean(low),
+            foot_speed=jnp.maximum(stats.foot_speed, speed),
             foot_pos=pos,
             foot_down=down,
-            tilt=tally.tilt + 1.0 - up,
-            wobble=tally.wobble + sensed.trunk_angvel @ sensed.trunk_angvel,
-            touch=tally.touch + touches(creature, sensed),
-            work=tally.work + positive_work(torque, sensed, self.step),
-            saturation=tally.saturation
+            tilt=stats.tilt + 1.0 - up,
+            wobble=stats.wobble + sensed.trunk_angvel @ sensed.trunk_angvel,
+            touch=stats.touch + touches(creature, sensed),
+            work=stats.work + positive_work(torque, sensed, self.step),
+            saturation=stats.saturation
             + jnp.mean(jnp.abs(torque) >= creature.gains.torque_limit.astype(np.float32)),
-            limits=tally.limits + jnp.mean(outside),
-            overlap=tally.overlap,
+            limits=stats.limits + jnp.mean(outside),
+            overlap=stats.overlap,
         )
 
     def _feet(self, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
@@ -216,7 +216,7 @@ def no_footfalls(feet: int) -> Footfalls:
     return Footfalls(each, each, each, each, jnp.zeros(()), each, each, each)
 
 
-def stepped(falls: Footfalls, before: Tally, after: Tally) -> Footfalls:
+def stepped(falls: Footfalls, before: EpisodeStats, after: EpisodeStats) -> Footfalls:
     """Advance by one step; the statistics before and after it show which feet landed or lifted."""
     now = after.steps.astype(jnp.float32)
     # The first stance began before the episode.
@@ -270,8 +270,8 @@ def gait_missed(
 
 
 @pytree
-class WishTally(Tally):
-    """See `Tally`.
+class TargetStats(EpisodeStats):
+    """Extension of `EpisodeStats`.
 
     falls: the footfalls.
     height, height_squared: [] m·steps, m²·steps of the trunk.
@@ -290,11 +290,11 @@ class WishTally(Tally):
     trunk: jax.Array
 
 
-def wish_tally(tally: Tally, feet: int) -> WishTally:
+def target_stats(stats: EpisodeStats, feet: int) -> TargetStats:
     """Extend empty statistics by the empty ones of the targets."""
     none = jnp.zeros(())
-    return WishTally(
-        **vars(tally),
+    return TargetStats(
+        **vars(stats),
         falls=no_footfalls(feet),
         height=none,
         height_squared=none,
@@ -305,13 +305,15 @@ def wish_tally(tally: Tally, feet: int) -> WishTally:
     )
 
 
-def wish_updated(creature: Body, before: WishTally, after: Tally, sensed: Sensed) -> WishTally:
+def target_updated(
+    creature: Body, before: TargetStats, after: EpisodeStats, sensed: Sensed
+) -> TargetStats:
     """Return the statistics after one more step; `after` holds those of every walk."""
     height = trunk_height(sensed)
     reads = ["roll", "pitch", "forward", "aside", "foot_place"]
     way = sense(creature, sensed, jnp.zeros(()), reads)
     ahead = (way["foot_place"] - creature.feet.places.astype(np.float32))[:, 0]
-    return WishTally(
+    return TargetStats(
         **vars(after),
         falls=stepped(before.falls, before, after),
         height=before.height + height,
@@ -323,7 +325,7 @@ def wish_updated(creature: Body, before: WishTally, after: Tally, sensed: Sensed
     )
 
 
-def along(before: WishTally, after: WishTally, told: jax.Array, half_time: int) -> WishTally:
+def along(before: TargetStats, after: TargetStats, told: jax.Array, half_time: int) -> TargetStats:
     """Return `after` with distances along the commanded heading [] in rad.
 
     half_time: step.

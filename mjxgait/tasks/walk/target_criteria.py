@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certification.config import CertificateConfig, WishesConfig
+from mjxgait.certification.config import CertificateConfig, TargetsConfig
 from mjxgait.certification.criteria import (
     Criterion,
     Measure,
@@ -38,7 +38,7 @@ HEADING_MEAN = 1.0
 """Averaging time in s: the nose swings within a stride."""
 
 
-def told_heading(wish: Wish, steps: int, time_step: float) -> np.ndarray | None:
+def commanded_heading(wish: Wish, steps: int, time_step: float) -> np.ndarray | None:
     """Commanded heading [T] in rad; None without a turn target."""
     if not {"turn", "steer"} & set(wish):
         return None
@@ -55,17 +55,17 @@ def draw_commands(
     rate = fastest * rng.uniform(0.5, 1.0, count) * np.where(np.arange(count) % 2, -1.0, 1.0)
     begin = rng.uniform(*COMMANDED, count)
     since = np.maximum(time_step * np.arange(steps) - begin[:, None], 0.0)
-    told: np.ndarray = np.radians(rate)[:, None] * since
-    return told
+    commanded: np.ndarray = np.radians(rate)[:, None] * since
+    return commanded
 
 
-def steered(outcome: Outcome, told: np.ndarray, limits: WishesConfig) -> Criterion:
+def steered(outcome: Outcome, commanded: np.ndarray, limits: TargetsConfig) -> Criterion:
     """11. The walk stays up and, some time after each command, keeps the commanded heading.
 
-    told: [S, T] rad.
+    commanded: [S, T] rad.
     """
     step = outcome.trajectory.time_step
-    width, begins = max(round(HEADING_MEAN / step), 1), (told != 0).argmax(1)
+    width, begins = max(round(HEADING_MEAN / step), 1), (commanded != 0).argmax(1)
     sums = np.cumsum(np.pad(outcome.astray, ((0, 0), (1, 0))), axis=1)
     off = np.degrees(np.abs(sums[:, width:] - sums[:, :-width]) / width)
     due = np.arange(off.shape[1]) >= (begins + round(limits.delay / step))[:, None]
@@ -87,9 +87,9 @@ def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> Certif
         config = dataclasses.replace(config, upright=dataclasses.replace(config.upright, tilt=tilt))
     if "speed" not in wish:
         return config
-    asked = wish["speed"]
-    slowest = FAST_ENOUGH * asked / size.body_length
-    stride = SHORTEST * animal_stride(asked, size.hip_height) / size.hip_height
+    requested = wish["speed"]
+    slowest = FAST_ENOUGH * requested / size.body_length
+    stride = SHORTEST * animal_stride(requested, size.hip_height) / size.hip_height
     return dataclasses.replace(
         config,
         progress=dataclasses.replace(
@@ -106,14 +106,14 @@ def unrolled(recording: Recording, wish: Wish) -> Recording:
 
     Each step of the path is turned back by the heading commanded at that time.
     """
-    told = told_heading(wish, len(recording.trunk_pos), recording.time_step)
-    if told is None:
+    commanded = commanded_heading(wish, len(recording.trunk_pos), recording.time_step)
+    if commanded is None:
         return recording
     x, y = np.diff(recording.trunk_pos[:, :2], axis=0, prepend=recording.trunk_pos[:1, :2]).T
-    ahead, left = np.cos(told), np.sin(told)
+    ahead, left = np.cos(commanded), np.sin(commanded)
     way = np.stack([x * ahead + y * left, y * ahead - x * left, 0 * x], 1).cumsum(0)
     place = way + recording.trunk_pos * [0, 0, 1]
-    heading = None if recording.heading is None else recording.heading - told
+    heading = None if recording.heading is None else recording.heading - commanded
     return dataclasses.replace(recording, trunk_pos=place, heading=heading)
 
 

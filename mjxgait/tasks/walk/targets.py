@@ -32,7 +32,7 @@ SPEED = re.compile(r"(?:fr)?[0-9]*\.?[0-9]+(?:e-?[0-9]+)?(?:bl/s|m/s)?")
 
 
 @dataclasses.dataclass(frozen=True)
-class Wishes:
+class WalkTargets:
     """Walk targets that a user requests.
 
     Attributes:
@@ -54,7 +54,7 @@ class Wishes:
     certificate: str | None = None
 
     @classmethod
-    def of(cls, given: Mapping[str, object]) -> "Wishes":
+    def of(cls, given: Mapping[str, object]) -> "WalkTargets":
         """Build the targets from the options that were given, as text or as values.
 
         Raises:
@@ -76,11 +76,11 @@ NATURAL = "natural"
 """Gait of an animal at this speed, whatever its name."""
 TURNS = ("turn", "steer")
 LEVELS = ("walks", "anywhere")
-WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
+TARGETS = tuple(field.name for field in dataclasses.fields(WalkTargets))
 
 
 def configured(
-    creature: Creature, file: Path | None, use: Mapping[str, str], wishes: Wishes
+    creature: Creature, file: Path | None, use: Mapping[str, str], targets: WalkTargets
 ) -> Config:
     """Return the settings of a run: the layers below the options, and the targets on top.
 
@@ -92,35 +92,35 @@ def configured(
     """
     config = resolve_config(creature.settings.train, creature.name, file, use)
     walks = config.use.task == "walk" and config.use.controller == "poses"
-    if wishes != Wishes() or file is not None or not walks:
-        return wished(config, creature, wishes)
+    if targets != WalkTargets() or file is not None or not walks:
+        return with_targets(config, creature, targets)
     try:
-        return wished(config, creature, Wishes(gait=creature.settings.usual.gait))
+        return with_targets(config, creature, WalkTargets(gait=creature.settings.usual.gait))
     except UserError as error:
         raise UserError(f"{creature.name}/creature.toml: [usual]: {error}") from None
 
 
-def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
+def with_targets(config: Config, creature: Creature, targets: WalkTargets) -> Config:
     """Return the settings overlaid with those that these targets stand for.
 
     Raises:
       UserError: names the target that means nothing, or not for this body.
     """
-    if wishes == Wishes():
+    if targets == WalkTargets():
         return config
     if config.use.task != "walk":
         raise UserError(
-            f"--{', --'.join(WISHES)} are for walking, and this is to {config.use.task}"
+            f"--{', --'.join(TARGETS)} are for walking, and this is to {config.use.task}"
         )
-    if wishes.style is not None:
-        config = _styled(config, wishes.style)
-    if wishes.certificate is not None:
-        config = _demanded(config, wishes.certificate)
+    if targets.style is not None:
+        config = _styled(config, targets.style)
+    if targets.certificate is not None:
+        config = _demanded(config, targets.certificate)
     table: dict[str, object] = {}
     for layer in (
-        _pace(wishes, creature, config),
-        _turn("turn", wishes.turn),
-        _turn("steer", wishes.steer),
+        _pace(targets, creature, config),
+        _turn("turn", targets.turn),
+        _turn("steer", targets.steer),
     ):
         table = merge(table, layer)
     if config.use.controller != "poses":
@@ -165,15 +165,15 @@ def speed_of(text: str, creature: Creature) -> float:
     return value * creature.frame.body_length if plain.endswith("bl/s") else value
 
 
-def _pace(wishes: Wishes, creature: Creature, config: Config) -> dict[str, object]:
+def _pace(targets: WalkTargets, creature: Creature, config: Config) -> dict[str, object]:
     """Settings for speed and gait, and for a textbook cycle near which evolution begins."""
-    asked, name = wishes.speed, wishes.gait or AUTO
-    if asked is None and name == AUTO:
+    requested, name = targets.speed, targets.gait or AUTO
+    if requested is None and name == AUTO:
         return {}
-    speed = top_speed(creature, config) if asked is None else speed_of(asked, creature)
+    speed = top_speed(creature, config) if requested is None else speed_of(requested, creature)
     usual = natural_gait(creature, speed)
     wish = _natural(usual) if name == NATURAL else _named(name, creature)
-    if asked is not None:
+    if requested is not None:
         wish = merge(wish, _speed(round(speed, 6), creature))
     begins = drawn(usual if name in (AUTO, NATURAL) else name, speed, creature, config)
     return merge(merge(wish, {"evolution": ORDERED}), begins)

@@ -16,21 +16,21 @@ from mjxgait.creature.settings import Termination
 from mjxgait.tasks.base import hardness
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.starts import Starts, draw_starts, milder
-from mjxgait.tasks.walk.config import WalkConfig, WishConfig
+from mjxgait.tasks.walk.config import TargetConfig, WalkConfig
 from mjxgait.tasks.walk.fitness import (
     fitness_terms,
     signed_weights,
+    target_weights,
     terms_under,
-    wish_weights,
     wished_terms,
 )
 from mjxgait.tasks.walk.stats import (
-    Judge,
-    Tally,
-    WishTally,
+    EpisodeStats,
+    StatsRecorder,
+    TargetStats,
     along,
-    wish_tally,
-    wish_updated,
+    target_stats,
+    target_updated,
     wrapped,
 )
 from mjxgait.types import Sensed
@@ -64,59 +64,59 @@ class Walk(PlainTask):
         return terms_under(self.settings.weights)
 
     @classmethod
-    def told(
+    def with_settings(
         cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: WalkConfig
     ) -> "Walk":
         """Return the task with these settings; targets need additional statistics."""
-        if settings.wish.asked and cls is Walk:
-            return AskedWalk(body, step, horizon, ends, settings)
+        if settings.wish.requested and cls is Walk:
+            return TargetedWalk(body, step, horizon, ends, settings)
         return cls(body, step, horizon, ends, settings)
 
     @property
     @override
-    def climbs(self) -> bool:
+    def has_curriculum(self) -> bool:
         return self.settings.hardening > 0
 
     @override
     def levels(self, settings: WalkConfig) -> int:
         return settings.hardening
 
-    def harder(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
-        """See `Task`: disturbances grow, so that individuals learn to withstand them bit by bit."""
+    def at_level(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
+        """Disturbances grow, so that individuals learn to withstand them bit by bit."""
         return milder(trials, hardness(settings.hardening, level))
 
-    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
-        """See `Task`: hardly any falls."""
+    def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+        """Hardly any falls."""
         return terms["fall"] <= FALLEN
 
     @property
-    def _keeper(self) -> Judge:
-        return Judge(self.creature, self.step, self.horizon // 2, self.settings.contact)
+    def _recorder(self) -> StatsRecorder:
+        return StatsRecorder(self.creature, self.step, self.horizon // 2, self.settings.contact)
 
-    def standards(self, settings: WalkConfig) -> jax.Array:
-        """See `Task`: the wanted clearance [] of each swing in m."""
+    def params(self, settings: WalkConfig) -> jax.Array:
+        """The wanted clearance [] of each swing in m."""
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
     @override
-    def init(self) -> Tally:
-        return self._keeper.init()
+    def init(self) -> EpisodeStats:
+        return self._recorder.init()
 
     @override
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
-    ) -> Tally:
-        return self._keeper.update(tally, sensed, torque, standards)
+        self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
+    ) -> EpisodeStats:
+        return self._recorder.update(stats, sensed, torque, params)
 
     @override
-    def judge(self, tally: Any, settings: WalkConfig) -> dict[str, jax.Array]:
-        return fitness_terms(self.creature, settings, self.step, self.horizon, tally)
+    def evaluate(self, stats: Any, settings: WalkConfig) -> dict[str, jax.Array]:
+        return fitness_terms(self.creature, settings, self.step, self.horizon, stats)
 
-    def outcome(self, tally: Tally) -> dict[str, jax.Array]:
-        """See `Task`: m forward, m to the left and s until the end."""
+    def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
+        """Distance in m forward and to the left, and s until the end."""
         return {
-            "forward": tally.forward,
-            "aside": tally.left,
-            "seconds": tally.steps * self.step,
+            "forward": stats.forward,
+            "aside": stats.left,
+            "seconds": stats.steps * self.step,
         }
 
     @override
@@ -124,25 +124,26 @@ class Walk(PlainTask):
         return signed_weights(settings, generation)
 
 
-class AskedWalk(Walk):
-    """Walk with targets; see `WishConfig`.
+class TargetedWalk(Walk):
+    """Walk with targets; see `TargetConfig`.
 
     A turn is commanded as a heading that turns. Distances are measured along it: forward and to the
     left of the heading commanded at each moment.
     """
 
     @property
-    def wish(self) -> WishConfig:
+    def wish(self) -> TargetConfig:
         """Targets of the walk."""
         return self.settings.wish
 
     @property
     @override
     def terms(self) -> tuple[str, ...]:
-        return (*super().terms, *wish_weights(self.wish))
+        return (*super().terms, *target_weights(self.wish))
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the usual initial conditions, and the rate of the commanded turn.
+        """The usual initial conditions, and the rate [R] of the commanded turn in
+        rad/s.
 
         With `turn`, all have the target rate. With `steer`, the first goes straight; the others
         turn left and right alternately, at half the target rate at least.
@@ -156,49 +157,49 @@ class AskedWalk(Walk):
             rate = self.wish.steer * side * drawn
         else:
             return starts
-        return dataclasses.replace(starts, turn=jnp.radians(rate))
+        return dataclasses.replace(starts, goal=jnp.radians(rate))
 
-    def aim(self, trial: Starts) -> Heading:
-        """See `Task`: the commanded heading [] in rad, and its change per step."""
-        if trial.turn is None:
+    def goal(self, trial: Starts) -> Heading:
+        """The commanded heading [] in rad, and its change per step."""
+        if trial.goal is None:
             return ()
-        return jnp.zeros(()), trial.turn * self.step
+        return jnp.zeros(()), trial.goal * self.step
 
     @override
-    def onward(self, aim: Heading, sensed: Sensed) -> Heading:
-        return (aim[0] + aim[1], aim[1]) if aim else aim
+    def next_goal(self, goal: Heading, sensed: Sensed) -> Heading:
+        return (goal[0] + goal[1], goal[1]) if goal else goal
 
-    def senses(self, aim: Heading, sensed: Sensed) -> dict[str, jax.Array]:
-        """See `Task`: with a commanded heading there is no line to return to."""
-        if not aim:
+    def observations(self, goal: Heading, sensed: Sensed) -> dict[str, jax.Array]:
+        """With a commanded heading there is no line to return to."""
+        if not goal:
             return {}
         heading = sense(self.creature, sensed, jnp.zeros(()), ["heading"])["heading"]
-        return {"heading": wrapped(heading - aim[0]), "aside": jnp.zeros(())}
+        return {"heading": wrapped(heading - goal[0]), "aside": jnp.zeros(())}
 
     @override
-    def init(self) -> WishTally:
-        return wish_tally(super().init(), len(self.creature.feet.names))
+    def init(self) -> TargetStats:
+        return target_stats(super().init(), len(self.creature.feet.names))
 
     @override
     def update(
         self,
-        tally: WishTally,
+        stats: TargetStats,
         sensed: Sensed,
         torque: jax.Array,
-        standards: jax.Array,
-        aim: Heading,
-    ) -> WishTally:
-        plain = self._keeper.update(tally, sensed, torque, standards)
-        after = wish_updated(self.creature, tally, plain, sensed)
-        return along(tally, after, aim[0], self.horizon // 2) if aim else after
+        params: jax.Array,
+        goal: Heading,
+    ) -> TargetStats:
+        plain = self._recorder.update(stats, sensed, torque, params)
+        after = target_updated(self.creature, stats, plain, sensed)
+        return along(stats, after, goal[0], self.horizon // 2) if goal else after
 
     @override
-    def judge(self, tally: WishTally, settings: WalkConfig) -> dict[str, jax.Array]:
-        return wished_terms(self.creature, settings, self.step, self.horizon, tally)
+    def evaluate(self, stats: TargetStats, settings: WalkConfig) -> dict[str, jax.Array]:
+        return wished_terms(self.creature, settings, self.step, self.horizon, stats)
 
     @override
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
-        wished = wish_weights(settings.wish)
+        with_targets = target_weights(settings.wish)
         return super().weights(settings, generation) | {
-            n: -jnp.float32(w) for n, w in wished.items()
+            n: -jnp.float32(w) for n, w in with_targets.items()
         }

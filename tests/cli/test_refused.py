@@ -1,0 +1,92 @@
+"""A refused command leaves no folder, so the corrected command can use the same one."""
+
+from pathlib import Path
+
+import pytest
+from animation.keys.made import swings, write
+from helpers import STOOL, said_by
+
+from mjxgait.cli.import_ import write_folder
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.importer import Imported
+from mjxgait.importer.notes import Notes
+
+STUDY = f"""
+question = "?"
+env = "{STOOL.as_posix()}"
+seeds = 2
+generations = 1
+
+[[variant]]
+name = "usual"
+
+[[variant]]
+name = "plain PD"
+settings = {{ drive = {{ law = "pd" }} }}
+"""
+WALKS = ("--env", STOOL, "--speeds", "0.2", "--turns", "10")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("train", "--env", STOOL),
+        ("train", "--env", STOOL, "--runs", "2"),
+        ("train", "--env", STOOL, "--evolution.islands.count", "2"),
+        ("repertoire", *WALKS),
+        ("ablate", "study.toml"),
+    ],
+    ids=["a run", "several runs", "islands", "a repertoire", "a study"],
+)
+def test_an_invalid_cluster_is_refused_first(
+    arguments: tuple[object, ...], tmp_path: Path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.toml").write_text(STUDY)
+    out = tmp_path / "out"
+    said = said_by(capsys, *arguments, "--cluster", "foo", "--out", out, code=2)
+    assert "--cluster foo: give auto or HOST:PORT" in said
+    assert not out.exists()
+
+
+def refuse(*_: object, **__: object) -> None:
+    raise UserError("MJX has no such thing")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("train", "--env", STOOL),
+        ("train", "--env", STOOL, "--runs", "2"),
+        ("refine", "--env", STOOL, "--keys", "walk.csv", "--tolerance", "9"),
+        ("refine", "--env", STOOL, "--keys", "walk.csv", "--tolerance", "9", "--keep", "1", "0"),
+        ("repertoire", *WALKS),
+        ("ablate", "study.toml"),
+    ],
+    ids=["a run", "several runs", "a cycle", "a cycle twice", "a repertoire", "a study"],
+)
+def test_an_unsupported_body_is_refused_first(
+    arguments: tuple[object, ...], stool: Creature, tmp_path: Path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("mjxgait.training.spec.make_plant", refuse)
+    (tmp_path / "study.toml").write_text(STUDY)
+    write(tmp_path, "csv", stool, swings(stool))
+    out = tmp_path / "out"
+    assert "no such thing" in said_by(capsys, *arguments, "--out", out, code=2)
+    assert not out.exists()
+
+
+def test_a_checkpoint_of_a_new_run_is_refused_first(tmp_path: Path, capsys):
+    out = tmp_path / "out"
+    said = said_by(capsys, "train", "--env", STOOL, "--out", out, "--generation", "3", code=2)
+    assert "needs --resume" in said
+    assert not out.exists()
+
+
+def test_an_invalid_import_is_not_written(tmp_path: Path, stool: Creature):
+    files = {**stool.files, "creature.toml": "[creature]\n"}
+    with pytest.raises(UserError, match=r"creature\.toml"):
+        write_folder(tmp_path / "out", Imported("broken", files, Notes(), True))
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,5 @@
+"""The browser of the pages."""
+
+from web.conftest import browser
+
+__all__ = ["browser"]

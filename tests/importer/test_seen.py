@@ -1,0 +1,250 @@
+"""What a person sees in a body, an import sees too: its front, its sides, what is no leg."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from importer.models import BIPED, QUADRUPED
+
+from mjxgait.certification.check_body import check_body
+from mjxgait.cli.import_ import write_folder
+from mjxgait.creature import Creature, load_creature
+from mjxgait.importer import ImportChoices, Imported, import_model, stance
+from mjxgait.importer.orient import _named_front
+
+
+@pytest.fixture
+def a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The standing pose is sought a sixth as long, where it is not what a test looks at."""
+    monkeypatch.setattr(stance, "FIRST", 60)
+    monkeypatch.setattr(stance, "ROUNDS", 4)
+
+
+def bring(folder: Path, text: str, kind: str = "xml") -> tuple[Creature, Imported]:
+    file = folder / f"model.{kind}"
+    file.write_text(text, encoding="utf-8")
+    imported = import_model(file, ImportChoices(apart=False))
+    write_folder(folder / "mine", imported)
+    return load_creature(folder / "mine"), imported
+
+
+def front(creature: Creature) -> np.ndarray:
+    """Forward axis [3] in the file's world: bodies here are written in their standing pose."""
+    return creature.frame.forward
+
+
+def limb(name: str, at: tuple[float, float], joints: str, end: str = "") -> str:
+    """A leg of two capsules straight down; joints: of its thigh."""
+    return (
+        f'<body name="{name}" pos="{at[0]} {at[1]} 0">{joints}'
+        f'<geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/>'
+        f'<body name="{name}_shin" pos="0 0 -.15">{end}'
+        f'<geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/></body></body>'
+    )
+
+
+def animal(legs: str, joints: str = "") -> str:
+    return (
+        '<mujoco><compiler angle="degree"/><worldbody><body name="trunk" pos="0 0 .35"><freejoint/>'
+        f'<geom type="box" size=".15 .15 .05"/>{joints}{legs}</body></worldbody></mujoco>'
+    )
+
+
+CORNERS = {"FL": (-0.1, 0.15), "FR": (0.1, 0.15), "BL": (-0.1, -0.15), "BR": (0.1, -0.15)}
+
+
+@pytest.mark.parametrize(("axis", "forward"), [("1 0 0", [0, 1, 0]), ("0 1 0", [1, 0, 0])])
+def test_forward_is_where_the_hinges_swing_the_feet(tmp_path, axis, forward):
+    """Both sides are alike along x and along y; legs that swing along y walk along y."""
+    legs = "".join(
+        limb(
+            name,
+            at,
+            f'<joint name="{name}_hip" axis="{axis}" range="-60 60"/>',
+            f'<joint name="{name}_knee" axis="{axis}" range="-70 70"/>',
+        )
+        for name, at in CORNERS.items()
+    )
+    creature, imported = bring(tmp_path, animal(legs))
+    np.testing.assert_allclose(np.abs(front(creature)), forward, atol=1e-6)
+    if axis == "1 0 0":  # and of its two ends the one with FL and FR is the front
+        assert front(creature)[1] > 0
+    assert "times as far along" in imported.notes.text()
+
+
+@pytest.mark.parametrize(
+    ("name", "side"),
+    [("FL_hip", 1), ("br", -1), ("front_leg", 1), ("hind", -1), ("flesh", 0), ("thigh_rl", -1)],
+)
+def test_corners_are_read_as_whole_words(name, side):
+    assert _named_front(name) == side
+
+
+@pytest.mark.usefixtures("a_short_search")
+def test_a_leg_without_a_foot_walks_the_way_its_knee_points(tmp_path):
+    """The file's knees bend backward from a front along -x, as those of gym's humanoid from x."""
+    legs = "".join(
+        limb(
+            name,
+            (0, y),
+            f'<joint axis="0 1 0" name="{name}_hip" range="-60 60"/>'
+            f'<joint axis="1 0 0" name="{name}_roll" range="-30 30"/>',
+            f'<joint axis="0 -1 0" name="{name}_knee" range="10 120"/>',
+        )
+        for name, y in (("left", 0.1), ("right", -0.1))
+    )
+    creature, imported = bring(tmp_path, animal(legs))
+    assert front(creature)[0] == pytest.approx(-1)
+    assert "knees point that way" in imported.notes.text()
+
+
+@pytest.mark.usefixtures("a_short_search")
+def test_an_ankle_without_an_exact_image_is_paired_and_told(tmp_path):
+    hinge = BIPED[BIPED.index('<joint name="right_ankle"') :]
+    hinge = hinge[: hinge.index("</joint>")]
+    askew = BIPED.replace(hinge, hinge.replace('axis xyz="0 1 0"', 'axis xyz="0.5 0.87 0"'))
+    creature, imported = bring(tmp_path, askew, "urdf")
+    names = creature.joints.names
+    left = names.index("left_ankle")
+    assert creature.mirror.symmetric
+    assert names[creature.mirror.partner[left]] == "right_ankle"
+    assert creature.mirror.sign[left] == 1
+    assert "left_ankle, right_ankle are paired by their names" in imported.notes.text()
+    assert [p.joint for p in creature.settings.mirror.pairs] == ["left_ankle", "right_ankle"]
+    check_body(creature)
+
+
+@pytest.mark.usefixtures("a_short_search")
+def test_an_ankle_that_only_one_leg_has_keeps_its_angle_in_both_halves(tmp_path):
+    """Half of the cycle is the other's mirror image, but for the ankle."""
+    start = BIPED.index('<joint name="right_ankle"')
+    welded = BIPED[:start] + BIPED[start:].replace('type="revolute"', 'type="fixed"', 1)
+    creature, imported = bring(tmp_path, welded, "urdf")
+    left = creature.joints.names.index("left_ankle")
+    assert creature.mirror.symmetric
+    assert creature.mirror.partner[left] == left
+    assert creature.mirror.sign[left] == 1
+    assert "left_ankle has no partner" in imported.notes.text()
+    check_body(creature)
+
+
+SEGMENTS = 9
+
+
+def insect() -> str:
+    """Six legs of eleven hinges, a mouth that hangs to the floor, and a head that swings."""
+    legs = ""
+    for i, x in enumerate((-0.2, 0, 0.2)):
+        for side, y in (("left", 0.1), ("right", -0.1)):
+            name = f"T{i}_{side}"
+            toes = "".join(
+                f'<body name="{name}_toe{k}" pos="0 0 -.01"><joint name="{name}_toe{k}" '
+                'axis="0 1 0" range="-20 20"/><geom type="sphere" size=".006"/>'
+                for k in range(SEGMENTS)
+            )
+            legs += (
+                f'<body name="{name}" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 1 0" '
+                'range="-60 60"/><geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/>'
+                f'<body name="{name}_shin" pos="0 0 -.15"><joint name="{name}_knee" axis="0 1 0" '
+                'range="-70 70"/><geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/>'
+                f'<body name="{name}_foot" pos="0 0 -.15">{toes}{"</body>" * SEGMENTS}'
+                "</body></body></body>"
+            )
+    mouth = (
+        '<body name="proboscis" pos=".3 0 0"><joint name="proboscis" axis="0 1 0" range="-40 40"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 -.35" size=".01"/></body>'
+    )
+    return animal(legs + mouth)
+
+
+@pytest.mark.usefixtures("a_short_search")
+def test_an_insect_walks_on_its_legs_and_keeps_the_joints_that_swing_them(tmp_path):
+    creature, imported = bring(tmp_path, insect())
+    assert len(creature.feet.names) == 6
+    names = creature.joints.names
+    assert "proboscis" not in names
+    assert len(names) == 36
+    for leg in ("T0_left", "T2_right"):
+        assert {f"{leg}_hip", f"{leg}_knee"} <= set(names)
+        assert f"{leg}_toe{SEGMENTS - 1}" not in names
+    assert "of 66 joints of the legs those that swing a foot least" in imported.notes.text()
+
+
+@pytest.mark.usefixtures("a_short_search")
+def test_a_swing_is_no_wing(tmp_path):
+    creature, _ = bring(tmp_path, QUADRUPED.replace("fl_shin", "swing_fl"))
+    assert len(creature.feet.names) == 4
+
+
+def folded(name: str, x: float, y: float) -> str:
+    """A leg whose thigh points back and whose shin lies along it."""
+    return (
+        f'<body name="{name}" pos="{x} {y} 0"><joint name="{name}_roll" axis="1 0 0" range="-40 40"/>'
+        f'<joint name="{name}_hip" axis="0 -1 0" range="-360 360"/>'
+        f'<geom type="capsule" fromto="0 0 0 -.15 0 0" size=".02"/><body name="{name}_shin" pos="-.15 0 0">'
+        f'<joint name="{name}_knee" axis="0 1 0" range="0 180"/>'
+        f'<geom type="capsule" fromto="0 0 0 .15 0 0" size=".02"/></body></body>'
+    )
+
+
+def test_legs_that_the_file_folds_are_let_down_alike(tmp_path):
+    legs = {"FL": (0.2, 0.12), "FR": (0.2, -0.12), "BL": (-0.2, 0.12), "BR": (-0.2, -0.12)}
+    creature, imported = bring(tmp_path, animal("".join(folded(n, *at) for n, at in legs.items())))
+    assert imported.stands
+    assert "mirror = symmetric" in imported.notes.text()
+    angles = dict(zip(creature.joints.names, creature.joints.stand, strict=True))
+    for joint in ("hip", "knee"):
+        alike = [angles[f"{leg}_{joint}"] for leg in legs]
+        np.testing.assert_allclose(alike, alike[0], atol=0.03)
+
+
+def test_a_knee_without_limits_bends_to_the_side_it_stands_on(tmp_path):
+    """The knees of the file are a little bent; without limits they could bend through."""
+    limits = '_knee" type="hinge" axis="0 1 0" range="-70 70"/>'
+    assert limits in QUADRUPED
+    unlimited = QUADRUPED.replace(limits, '_knee" type="hinge" axis="0 1 0"/>')
+    creature, imported = bring(tmp_path, unlimited)
+    assert "the file has no limits for" in imported.notes.text()
+    joints, data = creature.joints, mujoco.MjData(creature.model)
+    knee = joints.names.index("fl_knee")
+    for target in (joints.pose_low[knee], joints.pose_high[knee]):
+        data.qpos[:] = creature.stand_qpos
+        data.qpos[joints.qpos_adr[knee]] = target
+        mujoco.mj_kinematics(creature.model, data)
+        thigh, shin = creature.model.body("fl_thigh").id, creature.model.body("fl_shin").id
+        above = data.xpos[shin] - data.xpos[thigh]
+        below = data.geom_xpos[creature.feet.stepping[0]] - data.xpos[shin]
+        assert np.cross(above, below)[1] > 0
+
+
+HOPPER = """<mujoco><compiler angle="degree"/><default><joint type="hinge" axis="0 1 0"/>
+<geom type="capsule" size=".04"/></default><worldbody><body name="torso" pos="0 0 1">
+<joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/><joint name="tip"/>
+<geom fromto="0 0 0 0 0 .2" size=".07"/>
+<body name="pelvis" pos="0 0 -.05"><joint name="waist" range="-30 30"/><geom fromto="0 0 0 0 0 -.15" size=".06"/>
+<body name="thigh" pos="0 0 -.2"><joint name="hip" range="-170 10"/><geom fromto="0 0 0 0 0 -.33"/>
+<body name="calf" pos="0 0 -.33"><joint name="knee" range="5 150"/><geom fromto="0 0 0 0 0 -.32" size=".03"/>
+<body name="foot" pos="0 0 -.32"><joint name="ankle" range="-45 45"/><geom fromto="-.08 0 0 .17 0 0"/>
+</body></body></body></body></body></worldbody></mujoco>"""
+"""On one foot; its knee never comes to 0, and by halves of its ranges it would stand on its toe."""
+
+
+def test_who_has_one_foot_stands_on_all_of_it(tmp_path):
+    hopper, imported = bring(tmp_path, HOPPER)
+    assert imported.stands
+    data = mujoco.MjData(hopper.model)
+    data.qpos[:] = hopper.stand_qpos
+    mujoco.mj_kinematics(hopper.model, data)
+    heel, toe = (data.geom(f"foot_foot_{end}").xpos for end in (1, 2))
+    assert abs(toe[2] - heel[2]) < 0.01 * hopper.frame.hip_height
+
+
+def test_one_leg_swings_widely_in_all_of_its_joints(tmp_path):
+    """Of several a hock and a pastern do not; but who hops on one leg bends all of it."""
+    hopper, _ = bring(tmp_path, HOPPER)
+    span = dict(
+        zip(hopper.joints.names, hopper.joints.pose_high - hopper.joints.pose_low, strict=True)
+    )
+    assert span["knee"] > np.radians(70) > span["waist"]
+    assert span["hip"] > np.radians(50)

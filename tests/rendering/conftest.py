@@ -1,0 +1,16 @@
+"""A run of the smallest creature."""
+
+import pytest
+from rendering.made_up import treading, write_run
+
+from mjxgait.rendering.walk import record_walk
+
+
+@pytest.fixture(scope="session")
+def stool_walk(stool):
+    return record_walk(stool, treading(stool), 5.0)
+
+
+@pytest.fixture(scope="session")
+def stool_run(stool, tmp_path_factory):
+    return write_run(tmp_path_factory.mktemp("runs") / "stool", stool, treading(stool))

@@ -1,0 +1,143 @@
+"""The renderer without GPU and GL: shapes where MuJoCo has them, lengths to scale."""
+
+import mujoco
+import numpy as np
+import pytest
+from rendering.made_up import treading
+
+from mjxgait.rendering.floor import Camera, band_width
+from mjxgait.rendering.painter import (
+    Painter,
+    geom_colours,
+    paint,
+    seen_geoms,
+)
+from mjxgait.rendering.shapes import Silhouettes, hit
+from mjxgait.rendering.stage import Stage
+from mjxgait.rendering.walk import record_walk
+
+FORWARD = np.array([1.0, 0.0])
+SHAPES = {
+    "sphere": ("0.2", mujoco.mjtGeom.mjGEOM_SPHERE),
+    "capsule": ("0.1 0.2", mujoco.mjtGeom.mjGEOM_CAPSULE),
+    "ellipsoid": ("0.1 0.2 0.3", mujoco.mjtGeom.mjGEOM_ELLIPSOID),
+    "cylinder": ("0.1 0.2", mujoco.mjtGeom.mjGEOM_CYLINDER),
+    "box": ("0.1 0.2 0.3", mujoco.mjtGeom.mjGEOM_BOX),
+}
+MESH = '<asset><mesh name="m" vertex="0 0 0 0.4 0 0 0 0.4 0 0 0 0.4"/></asset>'
+
+
+def one_shape(kind, size="", asset=""):
+    data = 'type="mesh" mesh="m"' if kind == "mesh" else f'type="{kind}" size="{size}"'
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco>{asset}<worldbody><geom name="floor" type="plane" size="1 1 1"/>'
+        f'<body pos="0 0 1"><freejoint/><geom {data} euler="20 40 60" rgba="1 0 0 1"/></body></worldbody></mujoco>'
+    )
+
+
+def view(scale=200.0):
+    return Camera(np.array([0.0, 0.0, 1.0]), FORWARD, scale, 320, 240)
+
+
+def painted(model):
+    """Mask [240, 320] of the red shape, and its data."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    picture = paint(
+        view(),
+        [(Painter(model), data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))],
+        np.zeros(2),
+    )
+    colour = np.asarray(picture).astype(int)
+    return colour[..., 0] - colour[..., 1] > 40, data
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_rays_hit_where_mujoco_says(kind):
+    text, geom = SHAPES[kind]
+    size = np.array([*map(float, text.split()), 0, 0])[:3]
+    rng = np.random.default_rng(0)
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    origins = rng.uniform(-0.35, 0.35, (400, 3)) - 2 * direction
+    distance, normal = hit(int(geom), size, origins, direction)
+    here = np.eye(3).ravel()
+    expected = [
+        mujoco.mju_rayGeom(np.zeros(3), here, size, o, direction, int(geom), None) for o in origins
+    ]
+    expected = np.where(np.array(expected) < 0, np.inf, expected)
+    assert np.isfinite(expected).sum() > 30
+    np.testing.assert_allclose(distance, expected, atol=1e-6)
+    assert (normal[np.isfinite(distance)] @ direction < 1e-9).all()
+
+
+@pytest.mark.parametrize("kind", [*SHAPES, "mesh"])
+def test_every_shape_is_painted_where_it_is(kind):
+    model = one_shape(kind, SHAPES.get(kind, ("",))[0], MESH if kind == "mesh" else "")
+    mask, data = painted(model)
+    rays = view().rays(np.arange(320), np.arange(240)).reshape(-1, 3)
+    into = view().axes[2]
+    ids = np.zeros(1, np.int32)
+    seen = [
+        mujoco.mj_ray(model, data, o - 5 * into, into, None, 1, -1, ids) >= 0 and ids[0] == 1
+        for o in rays[::7]
+    ]
+    assert sum(seen) > 100
+    assert (mask.ravel()[::7] == np.array(seen)).mean() > 0.985
+
+
+def test_nearer_shapes_hide_those_behind():
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><body pos="0 -0.5 1"><geom type="sphere" size="0.1" rgba="1 0 0 1"/></body>'
+        '<body pos="0 0.5 1"><geom type="sphere" size="0.3" rgba="0 0 1 1"/></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    camera = Camera(np.array([0.0, 0.0, 1.0]), FORWARD, 100, 200, 200, azimuth=0.0, elevation=0.1)
+    for order in ([0, 1], [1, 0]):
+        painter = Painter(model)
+        painter.geoms, painter.colours = painter.geoms[order], painter.colours[order]
+        painter.outlines = Silhouettes(model, painter.geoms)
+        picture = paint(
+            camera, [(painter, data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2)
+        )
+        red, _, blue = picture.getpixel((100, 95))
+        assert red > blue
+
+
+def test_the_scale_on_the_floor_is_true():
+    camera = view(150.0)
+    one_metre = camera.pixels(np.array([[0, 0, 0], [1, 0, 0]], float))
+    across = np.linalg.norm(one_metre[1] - one_metre[0])
+    elsewhere = camera.pixels(np.array([[3, -2, 0], [4, -2, 0]], float))
+    assert np.linalg.norm(elsewhere[1] - elsewhere[0]) == pytest.approx(across)
+    assert band_width(150.0) == 0.5
+
+
+def test_the_creature_walks_to_the_right_and_up_is_up():
+    here, ahead, above = view().pixels(np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1]], float))
+    assert ahead[0] > here[0]
+    assert above[1] < here[1]
+
+
+def test_only_geoms_that_mujoco_shows_are_drawn():
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><asset><material name="m" rgba="0 1 0 1"/></asset><worldbody><geom type="plane" size="1 1 1"/><body>'
+        '<geom size="1" material="m"/><geom size="1" group="4"/><geom size="1" rgba="0 0 0 0"/></body></worldbody></mujoco>'
+    )
+    assert seen_geoms(model).tolist() == [1]
+    assert geom_colours(model)[1].tolist() == [0, 1, 0, 1]
+
+
+def test_every_shipped_creature_fills_its_picture(shipped):
+    stage = Stage([record_walk(shipped, treading(shipped), 0.3)], 320, 180)
+    with_creature = np.asarray(stage.picture(10), int)
+    empty = np.asarray(paint(stage.camera(10), [], stage.origin), int)
+    differs = np.abs(with_creature - empty).sum(2) > 30
+    rows, columns = np.flatnonzero(differs.any(1)), np.flatnonzero(differs.any(0))
+    assert differs.mean() > 0.05
+    assert rows[0] > 2
+    assert rows[-1] < 177
+    assert columns[0] > 2
+    assert columns[-1] < 317
+    assert max(np.ptp(rows) / 180, np.ptp(columns) / 320) > 0.6

@@ -1,5 +1,0 @@
-"""The browser of the pages."""
-
-from viewing.conftest import browser
-
-__all__ = ["browser"]

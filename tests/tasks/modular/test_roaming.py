@@ -1,0 +1,314 @@
+"""Modular bodies that walk, jump or follow a light, through the same run as all creatures."""
+
+import dataclasses
+import types
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from controllers.sims_brain.made_up import CALM, moment
+
+from mjxgait.api import load_creature
+from mjxgait.certification.acceptance import acceptance_of, promising
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.trials import simulate
+from mjxgait.config.schema import RolloutConfig
+from mjxgait.controllers.sims_brain.reference_body import LIGHT
+from mjxgait.creature import Creature
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.state import EvolutionState
+from mjxgait.plugins.registry import build_config
+from mjxgait.reference.bodies import VELOCITY_STAGE
+from mjxgait.reference.outcome import Outcome
+from mjxgait.reference.sight import seen_grown
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.reference.stepping import Stepping
+from mjxgait.tasks.modular.config import JumpConfig, RoamConfig
+from mjxgait.tasks.modular.follow import Following, FollowInWater, FollowOnLand
+from mjxgait.tasks.modular.task import SPANS, Jump, Roam
+from mjxgait.training.experiment import Experiment, build_experiment
+
+TABLE = {
+    "use": {"controller": "brain", "task": "follow-on-land"},
+    "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
+    "evolution": {"population": 60},
+    "seed": 1,
+    "rollout": {"seconds": 1.6, "starts": 2, "promote": 1.0, "lanes": 20, "joint_noise": 0.1},
+    "fitness": {"settle": 0.1, "weights": {"overlap": 0.0, "balance": 0.0}},
+}
+COUNT = 8
+
+
+@pytest.fixture(scope="module")
+def experiment() -> Experiment:
+    """An experiment with small capacities, so that it compiles fast."""
+    return build_experiment(load_creature("blocks"), build_config(TABLE, "test"))
+
+
+@pytest.fixture(scope="module")
+def first(experiment: Experiment) -> EvolutionState:
+    """The first population, evaluated without a generation step; best first."""
+    state, task = experiment.init(), experiment.simulator.task
+    stats = jax.jit(experiment.simulate)(state.genomes).stats
+    told = jax.vmap(jax.vmap(task.outcome))(stats)
+    outcome = np.stack([np.asarray(told[name]) for name in task.outcomes], axis=-1)
+    order = np.argsort(-outcome[:, :, 0].mean(1))
+    return dataclasses.replace(
+        state,
+        key=jnp.zeros(()),
+        genomes=jax.tree.map(lambda leaf: np.asarray(leaf)[order], state.genomes),
+        outcome=outcome[order],
+    )
+
+
+@pytest.mark.thorough(
+    "test_swimming.py evolves bodies of blocks, and other tests here judge walkers"
+)
+def test_walkers_get_faster(experiment: Experiment):
+    step, state, best = experiment.compile(), experiment.place(experiment.init()), []
+    for _ in range(4):
+        state, metrics = step(state)
+        best.append(float(metrics.best))
+    assert np.isfinite(best).all()
+    assert best == sorted(best)
+    assert best[-1] > best[0] > 0
+
+
+def test_the_reference_simulator_finds_the_same_approach(experiment: Experiment, first):
+    """Two implementations of body, brain, ground, light, and the height at the start."""
+    mine, ways, elsewhere = first.outcome[:COUNT, 0, 0], [], []
+    for rank in range(COUNT):
+        champion = experiment.champion(first, {}, rank)
+        body = champion.embodied(experiment.creature)
+        start = nominal_starts(body, 1)
+        behind = dataclasses.replace(start, light=np.array([[-10.0, 0.0, 0.0]]))
+        ways.append(nearer(body, simulate(body, champion, start, 1.6, record=1)))
+        elsewhere.append(nearer(body, simulate(body, champion, behind, 1.6, record=1)))
+    lengths = np.array(ways)
+    assert lengths.max() > 0.05
+    # A corner that touches one tick earlier changes the path.
+    assert np.median(np.abs(mine - lengths) / lengths) < 0.05
+    assert (np.abs(lengths - elsewhere) > 0.02).any(), "some go by the light"
+
+
+def test_reference_light_direction_is_in_each_blocks_own_axes(experiment: Experiment, first):
+    champion = experiment.champion(first, {})
+    body, light = champion.embodied(experiment.creature), np.array([3.0, -4.0, 1.0])
+    task = acceptance_of("follow-on-land")
+    start = dataclasses.replace(nominal_starts(body, 2), light=np.stack([light, 0 * light]))
+    bodies = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task).bodies
+    bodies.qpos[:, 3:7] = [0.5, -0.5, 0.1, 0.7]
+    bodies.batch.forward(stage=VELOCITY_STAGE)
+    seen, dark = bodies.light(np.arange(2))
+    assert not dark.any()
+    data = mujoco.MjData(body.model)
+    data.qpos[:] = bodies.qpos[0]
+    mujoco.mj_kinematics(body.model, data)
+    for part in range(body.model.nbody - 1):
+        block = body.model.geom(f"block{part}").id
+        there = bodies.start.place + light - data.geom_xpos[block]
+        there = data.geom_xmat[block].reshape(3, 3).T @ there
+        np.testing.assert_allclose(seen[part], there / np.linalg.norm(there), atol=1e-9)
+
+
+def test_only_starts_with_the_same_light_and_bar_are_shared(experiment: Experiment, first):
+    """Undisturbed starts are shared only when light and bar agree."""
+    champion = experiment.champion(first, {})
+    body, task = champion.embodied(experiment.creature), acceptance_of("follow-on-land")
+    lights = np.array([[10.0, 0, 0], [0, 10.0, 0], [10.0, 0, 0]])
+    start = dataclasses.replace(nominal_starts(body, 3), light=lights)
+    stepping = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task)
+    leader, waiting = stepping._alike(None)
+    assert {leader, *waiting} == {0, 2}
+    stepping.starts = dataclasses.replace(
+        start, bar=np.array([[1.0, 0.2], [np.inf] * 2, [1.0, 0.3]])
+    )
+    assert not len(stepping._alike(None)[1]), "nor like who has another bar"
+
+
+def nearer(body: Creature, outcome: Outcome) -> float:
+    """Approach in m to the light ahead, from 0.1 s on; the statistics end before the last step."""
+    film = outcome.trajectory
+    middle = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).middle[[10, -1], :2]
+    apart = np.linalg.norm(middle - [LIGHT, 0.0], axis=1)
+    return float(apart[0] - apart[1])
+
+
+def test_heights_and_positions_are_kept_for_every_frame(experiment: Experiment, first):
+    """Also without a recording. In weak gravity (0.5 m/s²) every body leaps."""
+    highest = []
+    for rank in range(4):
+        champion = dataclasses.replace(experiment.champion(first, {}, rank), task="jump")
+        body = champion.embodied(experiment.creature)
+        body.model.opt.gravity[2] = -0.5
+        outcome = simulate(body, champion, nominal_starts(body, 2), 4.0, record=1)
+        film = outcome.trajectory
+        seen = seen_grown(body, film.qpos[0], film.qvel[0], 0.0)
+        # A frame is recorded before the step; these values follow it.
+        np.testing.assert_allclose(outcome.low[0, :-1], seen.low[1:], atol=1e-9)
+        moved = seen.middle[1:] - body.stand_qpos[:3]
+        np.testing.assert_allclose(outcome.middle[0, :-1], moved, atol=1e-9)
+        np.testing.assert_array_equal(outcome.low[0], outcome.low[1])
+        np.testing.assert_array_equal(outcome.middle[0], outcome.middle[1])
+        highest.append(outcome.low[0].max())
+    assert max(highest) > 0
+
+
+def evaluation(
+    task: Roam, tilt: float = 0.0, sunk: float = 0.0, before: float = 0.0
+) -> dict[str, float]:
+    """Terms at 1 m/s. tilt, sunk: at one moment; before: both, before settling. Angles in deg."""
+    settings = RoamConfig(settle=0.5)
+    stats, params = task.init(), task.params(settings)
+    for k in range(task.horizon):
+        angle = np.radians({10: before, 100: tilt}.get(k, 0.0))
+        turned = jnp.array(
+            [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+        )
+        own = {
+            "com": jnp.array([0.0, task.step * k, 0.1 * k]),
+            "depth": jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
+        }
+        sensed = moment(own, trunk_rot=turned)
+        stats = task.update(stats, sensed, jnp.zeros(3), params, ())
+    return {name: float(value) for name, value in task.evaluate(stats, settings).items()}
+
+
+@pytest.fixture(scope="module")
+def task(experiment: Experiment) -> Roam:
+    found = experiment.simulator.task
+    assert isinstance(found, FollowOnLand)
+    return Roam(found.creature, found.step, found.horizon, found.ends)
+
+
+def test_motion_counts_only_after_settling(task: Roam):
+    calm = evaluation(task, before=90.0)
+    # The last moment is the one before the end.
+    assert calm["speed"] == pytest.approx(1.0, rel=0.02)
+    assert calm["overlap"] == calm["balance"] == pytest.approx(0, abs=1e-6)
+
+
+def test_tipping_over_costs_speed(task: Roam):
+    leaning, over = (evaluation(task, tilt=tilt) for tilt in (RoamConfig().tilt, 180.0))
+    assert leaning["balance"] == pytest.approx(leaning["speed"] / 2, rel=1e-3)
+    assert over["balance"] > 0.9 * over["speed"]
+    assert leaning["overlap"] == 0
+
+
+def test_jump_height_is_of_the_lowest_part_after_settling(task: Roam):
+    jumping = Jump(task.creature, task.step, task.horizon, task.ends)
+    settings = JumpConfig(settle=0.5)
+
+    def jumped(sunk: float = 0.0, again: float = 0.0) -> dict[str, float]:
+        """0.3 m high in the first half of the counted time, `again` m in the second."""
+        stats, params = jumping.init(), jumping.params(settings)
+        heights = {10: 0.7, 60: 0.2, 80: 0.3, 120: again, 140: again / 2}
+        for k in range(task.horizon):
+            low = CALM.geom_low.at[:].set(1.0).at[1].set(heights.get(k, 0.0))
+            deep = jnp.float32(sunk if k == 100 else -1.0)
+            sensed = moment({"depth": deep}, geom_low=low)
+            stats = jumping.update(stats, sensed, jnp.zeros(3), params, ())
+        return {name: float(value) for name, value in jumping.evaluate(stats, settings).items()}
+
+    assert jumped(again=0.3) == pytest.approx({"height": 0.3, "overlap": 0, "wild": 0})
+    assert jumped() == pytest.approx({"height": 0.15, "overlap": 0, "wild": 0})
+    assert jumped(settings.overlap)["overlap"] == pytest.approx(0.075)
+    assert jumped(settings.overlap / 2)["overlap"] < 0.005, "who jumps has to land"
+    deep = jumped(10 * settings.overlap)
+    assert deep["overlap"] < deep["height"]
+    half = dataclasses.replace(
+        jumping.init(), heights=jnp.full(SPANS, 0.3), steps=jnp.int32(task.horizon // 2)
+    )
+    assert float(jumping.evaluate(half, settings)["wild"]) == pytest.approx(0.15)
+
+
+def test_sinking_into_the_ground_costs_speed(task: Roam):
+    touching, deep = (evaluation(task, sunk=sunk) for sunk in (RoamConfig().overlap, 1.0))
+    assert touching["overlap"] == pytest.approx(touching["speed"] / 2, rel=1e-3)
+    assert deep["overlap"] > 0.99 * deep["speed"]
+    both = evaluation(task, tilt=180.0, sunk=1.0)
+    assert both["overlap"] + both["balance"] < both["speed"]
+
+
+@pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
+def test_following_counts_the_approach_to_the_light(task: Roam, follower: type):
+    """The body moves 2 m of the 10 m; a step aside gains nothing."""
+    following = follower(task.creature, task.step, task.horizon, task.ends)
+    settings = following.Settings(settle=0.0)
+    for light, way in (([10.0, 0, 0], 2.0), ([-10.0, 0, 0], -2.0), ([0, 10.0, 0], -0.198)):
+        stats, params = following.init(), following.params(settings)
+        for k in (0, 1):
+            sensed = moment({"com": jnp.array([2.0 * k, 0.0, 0.0])})
+            stats = following.update(stats, sensed, jnp.zeros(3), params, jnp.array(light))
+        assert float(following.way(stats)) == pytest.approx(way, abs=1e-3)
+        evaluation = following.evaluate(
+            dataclasses.replace(stats, overlap=jnp.float32(1.0)), settings
+        )
+        assert (evaluation["overlap"] > 0) == (way > 0), "nothing is gained by blocks in each other"
+
+
+@pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
+@pytest.mark.parametrize("others", [1, 2, 3, 4, 5, 64])
+def test_lights_cancel_out_and_change_every_round(task: Roam, follower: type, others: int):
+    """Swimming straight ahead gains nothing by luck. No light can be memorized except the first,
+    which is ahead.
+    """
+    following: Following = follower(task.creature, task.step, task.horizon, task.ends)
+    rounds = 200
+    rollout = RolloutConfig(starts=1 + others * rounds, variety=rounds)
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
+    np.testing.assert_allclose(np.linalg.norm(lights, axis=1), 1.0, rtol=1e-5)
+    assert lights[0] == pytest.approx([1, 0, 0])
+    drawn = lights[1:].reshape(rounds, others, 3)
+    np.testing.assert_allclose(lights[0] + drawn.sum(1), np.zeros((rounds, 3)), atol=1e-4)
+    if following.axes == 2:
+        assert np.abs(drawn[..., 2]).max() < 1e-6
+    if others > 2:
+        # Evenly to all sides, without repetition.
+        assert np.abs(drawn[:, -1, 1:].mean(0)).max() < 0.15
+        assert len(np.unique(drawn[:, -1].round(5), axis=0)) > 0.95 * rounds
+
+
+@pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
+def test_many_lights_cover_all_directions(task: Roam, follower: type):
+    following: Following = follower(task.creature, task.step, task.horizon, task.ends)
+    rollout = RolloutConfig(starts=200)
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
+    spread = (lights**2).mean(0)
+    np.testing.assert_allclose(spread[: following.axes], 1 / following.axes, atol=0.1)
+
+
+def test_lights_in_water_form_tetrahedra_and_crosses(task: Roam):
+    following = FollowInWater(task.creature, task.step, task.horizon, task.ends)
+    rollout = RolloutConfig(starts=1 + 3 * 100, variety=100)
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
+    cosines = [np.sort(np.r_[1, one[:, 0]]) for one in lights[1:].reshape(100, 3, 3)]
+    solid, cross = ([-1 / 3] * 3 + [1], [-1, 0, 0, 1])
+    solids = sum(bool(np.allclose(found, solid, atol=1e-5)) for found in cosines)
+    crosses = sum(bool(np.allclose(found, cross, atol=1e-5)) for found in cosines)
+    assert solids + crosses == 100
+    assert min(solids, crosses) > 30
+
+
+def test_validation_requires_approaching_every_light():
+    acceptance, creature = acceptance_of("follow-on-land"), load_creature("blocks")
+    outcome = {"way": np.array([2.0, 2.0]), "seconds": np.array([10.0, 10.0])}
+    assert promising(acceptance, outcome, 10.0, creature)
+    slow = {**outcome, "way": np.array([2.0, 0.9])}
+    assert not promising(acceptance, slow, 10.0, creature)
+
+
+def test_a_promised_speed_counts_from_the_settling_time(task: Roam):
+    following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
+    settings, still = following.Settings(settle=0.5), jnp.zeros(3)
+    params = following.params(settings)
+    stats = following.update(following.init(), CALM, still, params, jnp.ones(3))
+    assert float(following.outcome(stats)["since"]) == pytest.approx(0.5, abs=task.step)
+    acceptance, config = acceptance_of("follow-on-land"), CertificateConfig()
+    for told, since in (({"since": 4.0}, 4.0), ({}, config.warmup)):
+        nominal = {"way": 1.2, "seconds": 10.0, **told}
+        champion = types.SimpleNamespace(origin={"nominal": nominal})
+        assert acceptance.since(champion, config) == since
+        assert acceptance.promise(champion, 10.0, config) == pytest.approx(1.2 / (10.0 - since))

@@ -1,0 +1,71 @@
+"""Pages in headless Chromium, and what their canvas shows."""
+
+import base64
+import io
+import shutil
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+
+SOFTWARE_GL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+
+
+def launch(playwright):
+    """Chromium with software GL; skips without Chromium."""
+    program = next(
+        (
+            found
+            for name in ("chromium", "chromium-browser", "google-chrome")
+            if (found := shutil.which(name))
+        ),
+        None,
+    )
+    if program is None:
+        pytest.skip("needs Chromium (apt: chromium)")
+    return playwright.chromium.launch(executable_path=program, args=SOFTWARE_GL)
+
+
+def watched_tab(browser, address):
+    """A loaded page, its errors, and the addresses it requested."""
+    tab = browser.new_page(viewport={"width": 900, "height": 700})
+    wrong, asked = [], []
+    tab.on(
+        "console", lambda message: wrong.append(message.text) if message.type == "error" else None
+    )
+    tab.on("pageerror", lambda error: wrong.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(address)
+    wait_until(tab, "document.getElementById('walk')?.loaded")
+    return tab, wrong, asked
+
+
+def wait_until(tab, expression, seconds=60):
+    """Poll from outside: the pages' rules forbid the browser's own way, which evaluates text."""
+    end = time.monotonic() + seconds
+    while not tab.evaluate(expression):
+        assert time.monotonic() < end, f"{expression} did not come true in {seconds} s"
+        tab.wait_for_timeout(100)
+
+
+def canvas(tab):
+    """Pixels [height, width, 4] of the 3D canvas."""
+    picture = tab.evaluate("document.getElementById('walk').toDataURL()")
+    return np.asarray(
+        Image.open(io.BytesIO(base64.b64decode(picture.split(",")[1]))).convert("RGBA"), int
+    )
+
+
+def drawn(tab, seconds=30):
+    """First pixels that are not blank: a model is drawn some time after it is loaded."""
+    end = time.monotonic() + seconds
+    while is_blank(picture := canvas(tab)):
+        assert time.monotonic() < end, f"the canvas is still blank after {seconds} s"
+        tab.wait_for_timeout(100)
+    return picture
+
+
+def is_blank(picture):
+    """Whether the transparent canvas is nearly empty."""
+    return (picture[..., 3] > 0).mean() < 0.02 or picture[picture[..., 3] > 0][:, :3].std() < 5

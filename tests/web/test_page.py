@@ -1,0 +1,191 @@
+"""`mjxgait share`: one file that plays on double click, without network requests.
+
+The browser tests need Chromium (apt: chromium) and the Python package playwright.
+"""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from helpers import made_up_certificate
+from rendering.made_up import treading, write_run
+from web.browser import canvas, drawn, is_blank, watched_tab
+
+from mjxgait.certification import CertificateConfig
+from mjxgait.certification.stress import Stress, StressConfig, Trial
+from mjxgait.cli import main
+from mjxgait.config.tables import build
+from mjxgait.errors import UserError
+from mjxgait.training.folder import CERTIFICATE, STRESS
+from mjxgait.web.page import certificate_table
+
+CERTIFIED = made_up_certificate("") | {
+    "passed": False,
+    "criteria": [
+        {
+            "number": 7,
+            "name": "gait",
+            "passed": False,
+            "measures": [
+                {
+                    "name": "slip <or> slide",
+                    "value": None,
+                    "sense": "<=",
+                    "threshold": 0.15,
+                    "passed": False,
+                }
+            ],
+        }
+    ],
+}
+
+
+def share(run, out):
+    with pytest.raises(SystemExit) as ended:
+        main(["share", str(run), "--out", str(out)])
+    return ended.value.code
+
+
+@pytest.fixture(scope="module")
+def page(stool, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    run = write_run(folder / "run", stool, treading(stool, degrees=12.0))
+    assert share(run, folder / "walk.html") == 0
+    return folder / "walk.html"
+
+
+@pytest.fixture(scope="module")
+def opened(browser, page):
+    """The loaded page, its errors and its requests."""
+    return watched_tab(browser, page.as_uri())
+
+
+def test_the_canvas_shows_a_creature_that_moves(opened):
+    tab, _, _ = opened
+    first = drawn(tab)
+    assert tab.evaluate("walk.availableAnimations") == ["walk"]
+    for _ in range(20):
+        tab.wait_for_timeout(130)
+        if np.abs(canvas(tab) - first).mean() > 0.1:
+            return
+    pytest.fail("the creature stands still")
+
+
+def test_the_page_has_no_errors_and_no_network_requests(opened):
+    _, wrong, asked = opened
+    assert wrong == []
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+def test_playback_can_be_paused_and_slowed(opened):
+    tab, _, _ = opened
+    tab.click("text=half")
+    assert tab.evaluate("walk.timeScale") == 0.5
+    tab.click("#play")
+    assert tab.evaluate("walk.paused")
+    assert tab.inner_text("#play") == "Play"
+
+
+def test_a_moment_can_be_chosen_and_stepped(opened):
+    tab, _, _ = opened
+    tab.evaluate("time.value = 5; time.dispatchEvent(new Event('input'))")
+    frame = tab.evaluate("walk.duration / time.max")
+    assert tab.evaluate("walk.paused")
+    assert tab.evaluate("walk.currentTime") == pytest.approx(5 * frame)
+    tab.click('[aria-label="one frame on"]')
+    assert tab.evaluate("walk.currentTime") == pytest.approx(6 * frame)
+    for _ in range(2):
+        tab.click('[aria-label="one frame back"]')
+    assert tab.evaluate("walk.currentTime") == pytest.approx(4 * frame)
+
+
+def test_the_camera_has_preset_views(opened):
+    tab, _, _ = opened
+    for place, turned in (("side", -90), ("front", 0)):
+        tab.click(f'.view:has-text("{place}")')
+        assert tab.evaluate("walk.cameraOrbit").startswith(f"{turned}deg")
+
+
+def test_the_page_fits_a_phone(browser, page):
+    tab = browser.new_page(viewport={"width": 390, "height": 844})
+    tab.goto(page.as_uri())
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+    tab.close()
+
+
+def test_a_blank_canvas_is_noticed(browser, page, tmp_path):
+    """The test of the canvas can fail."""
+    text = page.read_text(encoding="utf-8")
+    start = text.index("base64,", text.index("data:model/gltf-binary")) + len("base64,")
+    end = text.index('"', start)
+    (tmp_path / "broken.html").write_text(text[:start] + text[end:], encoding="utf-8")
+    tab = browser.new_page()
+    tab.goto((tmp_path / "broken.html").as_uri())
+    with pytest.raises(AssertionError, match="blank"):
+        drawn(tab, seconds=1.5)
+    assert not tab.evaluate("document.getElementById('walk').loaded")
+    assert is_blank(canvas(tab))
+    tab.close()
+
+
+def test_the_page_has_no_external_references(page):
+    text = page.read_text(encoding="utf-8")
+    own = text[: text.index('<script type="module">')]
+    assert "default-src 'none'" in own
+    for reference in ('src="http', 'href="http', "@import", 'src="//', "url(http"):
+        assert reference not in own
+    assert "sourceMappingURL" not in text
+    assert len(text) < 4_000_000
+
+
+def test_only_a_certificate_of_this_champion_is_shown(stool, tmp_path):
+    champion = treading(stool)
+    run = write_run(tmp_path / "run", stool, champion)
+    assert "Not examined" in certificate_table(run, stool, champion)
+    (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
+    assert "Not all criteria pass." in certificate_table(run, stool, champion)
+    assert "slip &lt;or&gt; slide" in certificate_table(run, stool, champion)
+    assert "outdated" in certificate_table(run, stool, treading(stool, degrees=3.0))
+    (run / CERTIFICATE).write_text(json.dumps(CERTIFIED))
+    assert "outdated" in certificate_table(run, stool, champion)
+    passing = made_up_certificate(champion.fingerprint)
+    (run / CERTIFICATE).write_text(json.dumps(passing))
+    assert "<p>All criteria pass.</p>" in certificate_table(run, stool, champion)
+    assert "inspect RUN --verify" in certificate_table(run, stool, champion)
+    (run / CERTIFICATE).write_text(json.dumps(passing | {"passed": False}))
+    assert "the file contradicts itself" in certificate_table(run, stool, champion)
+    lax = build(CertificateConfig, {"progress": {"drift": 5.0}}, "lax")
+    lenient = made_up_certificate(champion.fingerprint, config=lax)
+    (run / CERTIFICATE).write_text(json.dumps(lenient))
+    rules = "by other rules: progress.drift = 5.0 instead of 0.25"
+    assert f"Not certified. All criteria pass, but {rules}." in certificate_table(
+        run, stool, champion
+    )
+    (run / CERTIFICATE).write_text("[]")
+    with pytest.raises(UserError, match="not a certificate"):
+        certificate_table(run, stool, champion)
+
+
+def test_stress_results_are_shown_beside_the_certificate(stool, tmp_path):
+    champion = treading(stool)
+    run = write_run(tmp_path / "run", stool, champion)
+    (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
+    assert "anywhere" not in certificate_table(run, stool, champion)
+    trials = (Trial("bumps of 5%", 0.95, True), Trial("friction 0.4", 0.25, False))
+    found = Stress(champion.fingerprint, trials, StressConfig())
+    (run / STRESS).write_text(json.dumps(found.document()))
+    table = certificate_table(run, stool, champion)
+    assert "It does not walk anywhere." in table
+    assert re.search(r"friction 0.4.*25%.*fails", table)
+    (run / STRESS).write_text("{}")
+    with pytest.raises(UserError, match="mjxgait stress"):
+        certificate_table(run, stool, champion)
+
+
+def test_invalid_input_is_reported(stool, stool_run, tmp_path, capsys):
+    assert share(stool_run, tmp_path / "walk.pdf") == 2
+    assert share(stool_run, tmp_path / "missing" / "walk.html") == 2
+    assert share(tmp_path, tmp_path / "walk.html") == 2
+    assert share(write_run(tmp_path / "run", stool), tmp_path / "walk.html") == 2
+    assert "no champion yet" in capsys.readouterr().err
