@@ -28,7 +28,7 @@ with atheris.instrument_imports(include=["mjxgait"]):
     from mjxgait.controllers.expressions.written import MOST_NODES
     from mjxgait.errors import UserError
     from mjxgait.importer.convert import read_source
-    from mjxgait.importer.parts import Notes
+    from mjxgait.importer.notes import Notes
     from mjxgait.processes import python_command
 
 ROOT = Path(__file__).resolve().parents[1]

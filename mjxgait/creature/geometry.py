@@ -83,6 +83,11 @@ def ancestors(model: mujoco.MjModel, body: int) -> list[int]:
     return chain
 
 
+def subtree(model: mujoco.MjModel, body: int) -> list[int]:
+    """The body and all bodies below it."""
+    return [b for b in range(body, model.nbody) if body in ancestors(model, b)]
+
+
 def leg_lengths(
     model: mujoco.MjModel, data: mujoco.MjData, feet: list[int], joints: list[int]
 ) -> np.ndarray:

@@ -27,6 +27,8 @@ MODEL, SETTINGS = "creature.xml", "creature.toml"
 SMALLEST, LARGEST = 0.2, 5.0
 SIZE = re.compile(r"\n *<size\b[^>]*/>")
 """MuJoCo's memory size, removed because MuJoCo finds it by itself."""
+ROUNDING = 1e-5
+"""Largest relative change of a sum of numbers that are written with six digits."""
 
 
 def parse_scales(texts: Sequence[str]) -> dict[str, float]:
@@ -54,6 +56,20 @@ def parse_scales(texts: Sequence[str]) -> dict[str, float]:
 def scaled(creature: Creature, scales: Mapping[str, float]) -> Creature:
     """Return the creature with scaled parts, by pattern of their names; see `scaled_files`."""
     return load_files(scaled_files(creature.files, scales)) if scales else creature
+
+
+def model_text(spec: mujoco.MjSpec) -> str:
+    """Return the text of creature.xml; MuJoCo writes numbers with six digits.
+
+    The largest moment of a flat or thin body is that of its two others together. It is lowered
+    where rounding would make it larger, because MuJoCo does not read that.
+    """
+    for body in spec.bodies:
+        moments = np.array([float(f"{moment:.6g}") for moment in body.inertia])
+        if body.explicitinertial and 2 * moments.max() > moments.sum():
+            largest = np.arange(3) == moments.argmax()
+            body.inertia = np.where(largest, 1 - ROUNDING, 1.0) * body.inertia
+    return SIZE.sub("", spec.to_xml())
 
 
 def load_files(files: Mapping[str, str]) -> Creature:
@@ -89,7 +105,7 @@ def scaled_files(
     _stand(spec, before)
     return {
         **files,
-        MODEL: SIZE.sub("", spec.to_xml()),
+        MODEL: model_text(spec),
         SETTINGS: _measured(files[SETTINGS], factors, body_length),
     }
 
@@ -162,7 +178,7 @@ def at_step(creature: Creature, step: float) -> Creature:
         return creature
     spec = mujoco.MjSpec.from_string(creature.files[MODEL])
     spec.option.timestep = step
-    return load_files({**creature.files, MODEL: SIZE.sub("", spec.to_xml())})
+    return load_files({**creature.files, MODEL: model_text(spec)})
 
 
 Way = Literal["forward", "back", "left", "right"]

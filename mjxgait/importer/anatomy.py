@@ -9,10 +9,14 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.creature.geometry import ancestors
+from mjxgait.creature.geometry import ancestors, subtree
 from mjxgait.errors import UserError
-from mjxgait.importer.parts import FREE, HINGE, SLIDE, Notes, Shape, read_shapes
+from mjxgait.importer.notes import Notes
+from mjxgait.importer.shapes import Shape
 
+FREE, BALL, SLIDE, HINGE = (
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE")
+)
 UP_AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, 1.0])}
 
 
@@ -24,33 +28,24 @@ def find_root(model: mujoco.MjModel) -> int:
     tops = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
 
     def weight(top: int) -> tuple[int, float]:
-        inside = [b for b in range(1, model.nbody) if top in ancestors(model, b)]
-        return sum(int(model.body_jntnum[b]) for b in inside), float(model.body_subtreemass[top])
+        joints = int(model.body_jntnum[subtree(model, top)].sum())
+        return joints, float(model.body_subtreemass[top])
 
     if not tops:
         raise UserError("the model has no body; there is nothing that could walk")
     root = max(tops, key=weight)
     while True:
-        children = [
-            b for b in range(1, model.nbody) if model.body_parentid[b] == root and b != root
-        ]
-        slides = _types(model, root) and all(t in (SLIDE, HINGE) for t in _types(model, root))
-        carries = len(children) == 1 and model.body_mass[root] < 1e-2 * model.body_subtreemass[root]
-        leads_on = children and SLIDE in _types(model, children[0])
-        below = children and any(t == SLIDE for t in _types(model, root))
-        if carries and (leads_on or (slides and below)):
-            root = children[0]
-        else:
+        children = [int(b) for b in np.flatnonzero(model.body_parentid == root)]
+        if len(children) != 1 or model.body_mass[root] >= 1e-2 * model.body_subtreemass[root]:
             return root
+        own, slides_on = _types(model, root), SLIDE in _types(model, children[0])
+        if not slides_on and not (SLIDE in own and set(own) <= {SLIDE, HINGE}):
+            return root
+        root = children[0]
 
 
 def _types(model: mujoco.MjModel, body: int) -> list[int]:
-    start = int(model.body_jntadr[body])
-    return (
-        [int(t) for t in model.jnt_type[start : start + int(model.body_jntnum[body])]]
-        if start >= 0
-        else []
-    )
+    return [int(t) for t in model.jnt_type[model.jnt_bodyid == body]]
 
 
 def in_plane(model: mujoco.MjModel, root: int) -> bool:
@@ -148,12 +143,14 @@ def turn_up(axis: np.ndarray) -> np.ndarray:
 class Anatomy:
     """Anatomy of a creature in one pose, up is z.
 
-    qpos: [nq] that pose. xpos [B, 3] m, xrot [B, 3, 3]: bodies in it. root: body id. bodies: ids of
-    the creature's bodies, parents first. active: ids of joints that move. feet: ids of the last
-    moving body of each leg. scale: m per unit of length. shapes: of each body, scaled. lowered:
-    whether qpos has the limbs let down instead of the file's zero pose.
+    spec: editable copy of its bodies, in the order of `bodies`. qpos: [nq] that pose. xpos [B, 3]
+    m, xrot [B, 3, 3]: bodies in it. root: body id. bodies: ids of the creature's bodies, parents
+    first. active: ids of joints that move. feet: ids of the last moving body of each leg. scale: m
+    per unit of length. shapes: of each body. lowered: whether qpos has the limbs let down instead
+    of the file's zero pose.
     """
 
+    spec: mujoco.MjSpec
     qpos: np.ndarray
     xpos: np.ndarray
     xrot: np.ndarray
@@ -183,24 +180,14 @@ def measured(
     model: mujoco.MjModel,
     qpos: np.ndarray,
     axis: np.ndarray,
-    root: int,
-    bodies: list[int],
     scale: float,
+    spec: mujoco.MjSpec,
+    shapes: dict[int, list[Shape]],
 ) -> Anatomy:
     """Measure the creature in one pose, without joints and feet. axis: [3], up in the file."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
-    turn = turn_up(axis)
-    shapes = {}
-    for b in bodies:
-        shapes[b] = read_shapes(model, b)
-        for s in shapes[b]:
-            s.size, s.pos, s.points, s.radius = (
-                s.size * scale,
-                s.pos * scale,
-                s.points * scale,
-                s.radius * scale,
-            )
-    xrot = turn @ data.xmat.reshape(-1, 3, 3)
-    return Anatomy(qpos, scale * data.xpos @ turn.T, xrot, root, bodies, [], [], scale, shapes)
+    turn, bodies = turn_up(axis), list(shapes)
+    xpos, xrot = scale * data.xpos @ turn.T, turn @ data.xmat.reshape(-1, 3, 3)
+    return Anatomy(spec, qpos, xpos, xrot, bodies[0], bodies, [], [], scale, shapes)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mjxgait.creature.geometry import rotation
 from mjxgait.importer.drive import Drive
-from mjxgait.importer.parts import Notes
+from mjxgait.importer.notes import Notes
 from mjxgait.plugins import resolve_config
 
 SECONDS = 2.0

@@ -1,203 +1,148 @@
-"""Text of creature.xml, and the kinematic model of the creature as it will be written.
+"""Kinematic model of the creature: poses, feet, and mirror images.
 
-Every physics backend can simulate the options in the text. The model gives poses and mirror images.
 Letters: `J` active joints, `B` bodies in the list's order (MuJoCo's ids less one).
 """
 
-import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+import dataclasses
+import functools
 
 import mujoco
 import numpy as np
 
 from mjxgait.creature import geometry
-from mjxgait.creature.creature import REST
 from mjxgait.creature.geometry import quaternion, rotation
-from mjxgait.errors import UserError
-from mjxgait.importer.parts import GEOM, Body, Shape
-from mjxgait.importer.skeleton import foot_tips, tip_points
+from mjxgait.importer.shapes import Shape, shapes_of
+from mjxgait.importer.spec import compiled
 
-KINDS = {
-    int(GEOM.mjGEOM_SPHERE): ("sphere", 1),
-    int(GEOM.mjGEOM_CAPSULE): ("capsule", 2),
-    int(GEOM.mjGEOM_CYLINDER): ("cylinder", 2),
-    int(GEOM.mjGEOM_ELLIPSOID): ("ellipsoid", 3),
-    int(GEOM.mjGEOM_BOX): ("box", 3),
-}
-HEAD = """
-  <compiler angle="radian" autolimits="false" inertiafromgeom="false"/>
-  <option timestep="0.005" integrator="Euler" cone="pyramidal" solver="Newton" iterations="3" ls_iterations="8">
-    <flag eulerdamp="disable"/>
-  </option>
-  <visual>
-    <headlight ambient="0.35 0.35 0.35" diffuse="0.45 0.45 0.45" specular="0.05 0.05 0.05"/>
-  </visual>
-  <default>
-    <joint type="hinge" limited="false"/>
-    <geom density="0"/>
-    <default class="visual"><geom contype="0" conaffinity="0" group="1"/></default>
-    <default class="collider"><geom contype="0" conaffinity="1"/></default>
-  </default>
-"""
-FLOOR = """
-    <geom name="floor" type="plane" size="0 0 0.05" contype="1" conaffinity="0" priority="1" friction="0.9 0.005 0.0001"
-          solref="0.01 1" rgba="0.42 0.47 0.42 1"/>
-"""
+SHANK_END = 0.7
+"""Share of a shank's length from which on it acts as the foot."""
 
 
-def creature_xml(
-    name: str, bodies: list[Body], stand: np.ndarray | None, rest: np.ndarray | None = None
-) -> str:
-    """Return the text of creature.xml. stand, rest: [nq] keyframes of these names, or None."""
-    root = ET.fromstring(f"<mujoco>{HEAD}<asset/><worldbody>{FLOOR}</worldbody></mujoco>")
-    root.set("model", name)
-    asset, world = root.find("asset"), root.find("worldbody")
-    assert asset is not None
-    assert world is not None
-    elements: list[ET.Element] = []
-    for body in bodies:
-        parent = world if body.parent < 0 else elements[body.parent]
-        elements.append(_body(parent, body))
-        for i, shape in enumerate(body.shapes):
-            if shape.solid or shape.seen:
-                _shape(elements[-1], asset, shape, f"{body.name}_mesh_{i}")
-    keyframes = {"stand": stand, REST: rest}
-    if stand is not None:
-        section = ET.SubElement(root, "keyframe")
-        for key, qpos in keyframes.items():
-            if qpos is not None:
-                ET.SubElement(section, "key", name=key, qpos=_text(qpos))
-    ET.indent(root)
-    return ET.tostring(root, encoding="unicode") + "\n"
+@dataclasses.dataclass(frozen=True, eq=False)
+class Tip:
+    """A shape of a foot.
 
-
-def compile_own(text: str) -> mujoco.MjModel:
-    """Compile a text that the import wrote.
-
-    Raises:
-      UserError: the file's numbers do not survive being written, such as an axis of no length.
+    far: [n] mask of the points at the foot's end; the others belong to the shank.
     """
-    try:
-        return mujoco.MjModel.from_xml_string(text)
-    except (ValueError, mujoco.FatalError) as error:
-        raise UserError(
-            "the repaired model does not compile; correct this in the file: "
-            f"{' '.join(str(error).split())[:300]}"
-        ) from None
+
+    shape: Shape
+    far: np.ndarray
+
+    @functools.cached_property
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points [n, 3] of the shank and of the foot's end; cached for the search."""
+        return self.shape.points[~self.far], self.shape.points[self.far]
 
 
-def _text(values: Sequence[float] | np.ndarray) -> str:
-    return " ".join(repr(float(v)) if v else "0" for v in values)
-
-
-def _body(parent: ET.Element, body: Body) -> ET.Element:
-    element = ET.SubElement(
-        parent, "body", name=body.name, pos=_text(body.pos), quat=_text(body.quat)
-    )
-    if body.parent < 0:
-        ET.SubElement(element, "freejoint", name="root")
-    for joint in body.joints:
-        made = ET.SubElement(
-            element, "joint", name=joint.name, pos=_text(joint.pos), axis=_text(joint.axis)
-        )
-        if np.isfinite(joint.low):
-            made.set("range", _text((joint.low, joint.high)))
-        if joint.stopped:
-            made.set("limited", "true")
-        if joint.ref:
-            made.set("ref", repr(joint.ref))
-        if joint.armature:
-            made.set("armature", repr(joint.armature))
-    if body.mass > 0:
-        inertia = {
-            "pos": _text(body.ipos),
-            "quat": _text(body.iquat),
-            "mass": repr(body.mass),
-            "diaginertia": _text(body.inertia),
-        }
-        ET.SubElement(element, "inertial", inertia)
-    return element
-
-
-def _shape(parent: ET.Element, asset: ET.Element, shape: Shape, mesh: str) -> None:
-    geom = ET.SubElement(parent, "geom", {"class": "collider" if shape.solid else "visual"})
-    if shape.name:
-        geom.set("name", shape.name)
-    if shape.solid and not shape.seen:
-        geom.set("group", "3")
-    if shape.kind in KINDS:
-        kind, sizes = KINDS[shape.kind]
-        geom.attrib.update(
-            type=kind, size=_text(shape.size[:sizes]), pos=_text(shape.pos), quat=_text(shape.quat)
-        )
-    elif _has_volume(shape.points):
-        ET.SubElement(
-            asset,
-            "mesh",
-            name=mesh,
-            vertex=" ".join(f"{v:.4g}" for v in shape.points.ravel()),
-            inertia="shell",
-        )
-        geom.attrib.update(type="mesh", mesh=mesh)
-    else:
-        low, high = shape.points.min(0), shape.points.max(0)
-        geom.attrib.update(
-            type="box", pos=_text((low + high) / 2), size=_text(np.maximum((high - low) / 2, 1e-4))
-        )
-    geom.set("rgba", " ".join(f"{v:.3g}" for v in np.clip(shape.rgba, 0, 1)))
-
-
-def _has_volume(points: np.ndarray) -> bool:
-    if len(points) < 4:
-        return False
-    spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
-    return bool(spread[2] > 0.02 * spread[0])
-
-
-FREE_POS, FREE_DOF = 7, 6
+def tip_points(tips: list[Tip], xpos: np.ndarray, xrot: np.ndarray, far: bool = True) -> np.ndarray:
+    """Lowest points [n, 3] of the balls of a foot's end, or of its shank."""
+    found = []
+    for t in tips:
+        low = xpos[t.shape.body] + t.ends[far] @ xrot[t.shape.body].T
+        low[:, 2] -= t.shape.radius
+        found.append(low)
+    return np.concatenate(found) if found else np.zeros((0, 3))
 
 
 class KinematicModel:
-    """Kinematic model of the bodies.
+    """Kinematic model of an editable model.
 
-    low, high: [J] limits in rad, infinite where there is none. feet: for each foot the places of
-    its bodies.
+    spec: the editable model. bodies, joints: its own, without the world and the free joint.
+    parent: [B] places of the parents, -1 for the trunk. shapes: of each body. low, high: [J] limits
+    in rad, infinite where there is none. feet: for each foot the places of its bodies. source: [J]
+    joint ids in the file. effort: [J] N·m, nan where the file states none. in_plane: whether the
+    file lets the trunk move in a plane only.
     """
 
-    def __init__(self, bodies: list[Body], feet: list[int], in_plane: bool = False) -> None:
-        """Compile the bodies. in_plane: whether the file lets the trunk move in a plane only."""
-        self.bodies, self.in_plane = bodies, in_plane
-        self.model = compile_own(creature_xml("puppet", bodies, None))
+    def __init__(
+        self,
+        spec: mujoco.MjSpec,
+        feet: list[int],
+        source: list[int],
+        effort: np.ndarray,
+        in_plane: bool,
+    ) -> None:
+        """Compile the editable model. feet: place of each foot's last moving body."""
+        self.spec, self.source, self.effort, self.in_plane = spec, source, effort, in_plane
+        self.model = compiled(spec)
         self.data = mujoco.MjData(self.model)
-        self.joints = [joint for body in bodies for joint in body.joints]
+        self.bodies, self.joints = spec.bodies[1:], spec.joints[1:]
+        self.parent = self.model.body_parentid[1:] - 1
+        self.shapes = [shapes_of(spec, body, i) for i, body in enumerate(self.bodies)]
         self.names = [joint.name for joint in self.joints]
-        self.low = np.array([joint.low for joint in self.joints])
-        self.high = np.array([joint.high for joint in self.joints])
+        ranges = np.array([joint.range for joint in self.joints]).reshape(-1, 2)
+        limited = ranges[:, 0] < ranges[:, 1]
+        self.low = np.where(limited, ranges[:, 0], -np.inf)
+        self.high = np.where(limited, ranges[:, 1], np.inf)
         self.feet = [self.welded(i) for i in feet]
-        self.tips = [foot_tips(bodies, group) for group in self.feet]
+        self.tips = [self._foot_tips(group) for group in self.feet]
         self.trunk = self.welded(0)
         self.mass = float(self.model.body_mass.sum())
+
+    def copy(self) -> "KinematicModel":
+        """Return a copy, compiled anew, that can be edited on its own."""
+        feet = [group[0] for group in self.feet]
+        return KinematicModel(self.spec.copy(), feet, self.source, self.effort, self.in_plane)
 
     def welded(self, i: int) -> list[int]:
         """Return a moving body and the bodies fixed to it."""
         group = [i]
         for k in range(i + 1, len(self.bodies)):
-            if self.bodies[k].parent in group and not self.bodies[k].joints:
+            if self.parent[k] in group and not self.model.body_jntnum[k + 1]:
                 group.append(k)
         return group
 
     def segments(self) -> list[list[int]]:
         """Return all moving bodies, the trunk first, each with the bodies fixed to it."""
-        return [self.welded(i) for i, body in enumerate(self.bodies) if i == 0 or body.joints]
+        return [self.welded(i) for i, count in enumerate(self.model.body_jntnum[1:]) if count]
 
     def leg(self, foot: int) -> list[int]:
         """Places in `joints` of the joints between the trunk and a foot, the highest first."""
-        chain, i = [], self.feet[foot][0]
-        while i > 0:
-            chain.append(i)
-            i = self.bodies[i].parent
-        order = [name for i in reversed(chain) for name in (j.name for j in self.bodies[i].joints)]
-        return [self.names.index(name) for name in order]
+        chain = geometry.ancestors(self.model, self.feet[foot][0] + 1)
+        on_leg = np.isin(self.model.jnt_bodyid[1:], chain)
+        return [int(j) for j in np.flatnonzero(on_leg)]
+
+    def lowest(self, xpos: np.ndarray, xrot: np.ndarray, chosen: list[int]) -> float:
+        """Lowest point in m of the chosen bodies at places [B, 3] with rotations [B, 3, 3]."""
+        lows = [np.inf]
+        for i in chosen:
+            lows += [
+                float((xpos[i, 2] + s.points @ xrot[i, 2]).min() - s.radius) for s in self.outer[i]
+            ]
+        return min(lows)
+
+    @functools.cached_property
+    def outer(self) -> list[list[Shape]]:
+        """Shapes of each body that touch the floor; those that are drawn where none does."""
+        return [
+            [s for s in shapes if s.solid] or [s for s in shapes if s.seen]
+            for shapes in self.shapes
+        ]
+
+    def _foot_tips(self, group: list[int]) -> list[Tip]:
+        """Shapes that a limb can step on, at the far end of its last moving and welded bodies."""
+        foot, chain = group[0], geometry.ancestors(self.model, group[0] + 1)[:-1]
+        above = sum(float(np.linalg.norm(self.model.body_pos[b])) for b in chain)
+        places = {foot: (np.zeros(3), np.eye(3))}
+        for i in group[1:]:
+            at, turn = places[self.parent[i]]
+            places[i] = (
+                at + turn @ self.bodies[i].pos,
+                turn @ rotation(self.bodies[i].quat),
+            )
+        shapes = [s for i in group for s in self.shapes[i]]
+        shapes = [s for s in shapes if s.solid] or [s for s in shapes if s.seen]
+        if not shapes:
+            return []
+        joints = self.bodies[foot].joints
+        ankle = joints[-1].pos if joints else np.zeros(3)
+        clouds = [places[s.body][0] + s.points @ places[s.body][1].T - ankle for s in shapes]
+        cloud = np.concatenate(clouds)
+        far = cloud[np.linalg.norm(cloud, axis=1).argmax()]
+        reach = float(np.linalg.norm(far))
+        # All of a short last part, a foot, may step; only the far end of a long one, a shank.
+        share = SHANK_END if reach > 0.25 * (above + reach) else -np.inf
+        return [Tip(s, c @ far > share * reach**2) for s, c in zip(shapes, clouds, strict=True)]
 
     def pose(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions [B, 3] m and rotations [B, 3, 3] at joint angles [J], the trunk as placed."""
@@ -207,9 +152,8 @@ class KinematicModel:
 
     def qpos(self, q: np.ndarray) -> np.ndarray:
         """Pose [nq] at joint angles [J], with the trunk as placed."""
-        return np.concatenate(
-            [self.bodies[0].pos, self.bodies[0].quat / np.linalg.norm(self.bodies[0].quat), q]
-        )
+        root = self.bodies[0]
+        return np.concatenate([root.pos, root.quat / np.linalg.norm(root.quat), q])
 
     def centre_of_mass(self) -> np.ndarray:
         """Centre of mass [3] m in the latest pose."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.errors import UserError
-from mjxgait.importer.parts import Notes, listed
+from mjxgait.importer.notes import Notes, listed
 from mjxgait.importer.source import (
     MOST_ELEMENTS,
     MOST_INCLUDES,
@@ -19,30 +19,33 @@ from mjxgait.importer.source import (
     lost,
     numbers,
     parse_xml,
-    put_stand_in,
 )
 
 DROPPED = {
     "sensor": "a sensor has no part in walking",
-    "visual": "it only concerns the picture",
-    "statistic": "it only concerns the picture",
-    "size": "memory is sized by what is there",
     "extension": "plugins are code, and no code of a model is run",
     "deformable": "soft parts cannot be simulated here",
+    "visual": "",
+    "statistic": "",
+    "size": "",
+    "custom": "",
 }
 INNER = {
     "plugin": "plugins are code, and no code of a model is run",
     "composite": "soft or repeated parts cannot be simulated here",
     "flexcomp": "soft parts cannot be simulated here",
     "attach": "another model inside the model is not read",
-    "camera": "it is not part of the body",
-    "light": "it is not part of the body",
-    "site": "",
-    "texture": "",
-    "skin": "",
     "hfield": "the floor is always flat",
     "model": "another model inside the model is not read",
+    "camera": "",
+    "light": "",
+    "texture": "",
+    "skin": "",
 }
+"""Sections, and elements anywhere, that are dropped, with the reason; "" is not reported.
+
+Sites stay, because tendons, actuators and equality constraints refer to them.
+"""
 COMPILER_FOLDERS = ("meshdir", "texturedir", "assetdir")
 MOST_COPIES = 64
 
@@ -66,10 +69,8 @@ def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None
     for name, why in DROPPED.items():
         for element in tree.findall(name):
             tree.remove(element)
-            if name == "sensor" or name in ("extension", "deformable"):
+            if why:
                 notes.change(f"<{name}> dropped", why)
-    for name in ("custom", "default"):
-        _empty(tree, name)
     _drop_inner(tree, notes)
     _drop_unreadable(source, places, folders, notes)
     for element in tree.iter():
@@ -127,27 +128,15 @@ def _compiler(tree: ET.Element) -> list[str]:
     return folders
 
 
-def _empty(tree: ET.Element, name: str) -> None:
-    """Remove <custom>; <default> stays."""
-    for element in tree.findall(name):
-        if name == "custom":
-            tree.remove(element)
-
-
 def _drop_inner(tree: ET.Element, notes: Notes) -> None:
-    # Sites carry tendons, actuators and equality constraints: those stay readable for now and sites
-    # with them.
-    dropped = {k: v for k, v in INNER.items() if k != "site"}
     total = 1.0
     parents = [(parent, child) for parent in tree.iter() for child in list(parent)]
     for parent, child in parents:
-        if child.tag in dropped:
+        if child.tag in INNER:
             parent.remove(child)
-            if dropped[child.tag] and child.tag not in ("camera", "light"):
-                notes.change(
-                    f"<{child.tag}> {child.get('name', '')} dropped".replace("  ", " "),
-                    dropped[child.tag],
-                )
+            if why := INNER[child.tag]:
+                what = f"<{child.tag}> {child.get('name', '')} dropped".replace("  ", " ")
+                notes.change(what, why)
         elif child.tag == "replicate":
             copies = numbers(child.get("count"))
             total *= max(copies[0], 1.0) if copies else MOST_COPIES + 1
@@ -158,21 +147,19 @@ def _drop_inner(tree: ET.Element, notes: Notes) -> None:
 
 
 def _drop_unreadable(source: Source, places: Places, folders: list[str], notes: Notes) -> None:
-    """Load meshes, with small ones in place of unreadable ones; remove geoms of height fields."""
+    """Load meshes, and list those that cannot be read; remove geoms of height fields."""
     for asset in source.tree.findall("asset"):
         for mesh in list(asset.findall("mesh")):
             reference = mesh.attrib.pop("file", None)
             if reference is None:
                 continue
-            name = mesh.get("name") or Path(reference).stem
-            mesh.set("name", name)
+            mesh.set("name", mesh.get("name") or Path(reference).stem)
             key = load_mesh(source, places, reference, folders, notes)
             if key is None:
-                put_stand_in(mesh)
-                source.missing[name] = reference
-            else:
-                mesh.set("file", key)
-                mesh.attrib.pop("content_type", None)
+                key = f"missing{len(source.missing)}.obj"
+                source.missing[key] = reference
+            mesh.set("file", key)
+            mesh.attrib.pop("content_type", None)
     for parent in list(source.tree.iter()):
         for geom in parent.findall("geom"):
             if geom.get("type") in ("hfield", "sdf") or "hfield" in geom.attrib:

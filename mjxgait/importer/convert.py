@@ -10,24 +10,22 @@ import numpy as np
 
 from mjxgait.animation.clips.clip import ELSEWHERE
 from mjxgait.creature import geometry
-from mjxgait.creature.geometry import rotation
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import in_plane
 from mjxgait.importer.balance import steady_balance
-from mjxgait.importer.body import KinematicModel, creature_xml
-from mjxgait.importer.checks import check_same, tell_dropped, tell_left_out
+from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.clean import clean_mjcf, clean_urdf
 from mjxgait.importer.find import find_anatomy
+from mjxgait.importer.notes import Notes, listed, one_line, plain_names, tell_dropped, tell_left_out
 from mjxgait.importer.orient import (
     find_forward,
     find_mirror,
     is_planar,
     yaw_to,
 )
-from mjxgait.importer.parts import Notes, listed, one_line, plain_names
 from mjxgait.importer.rigged import RIGS, model_of
-from mjxgait.importer.skeleton import build_bodies
 from mjxgait.importer.source import Places, Source, parse_xml
+from mjxgait.importer.spec import add_joints, creature_xml, place_bodies
 from mjxgait.importer.stance import stance_of
 from mjxgait.importer.standing import (
     Candidate,
@@ -120,11 +118,11 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, up, notes)
     if source.up:
         notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
-    tell_left_out(model, anatomy, notes)
-    bodies = build_bodies(model, anatomy, source.efforts, notes)
-    puppet = KinematicModel(
-        bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root)
-    )
+    tell_left_out(model, anatomy.bodies, notes)
+    place_bodies(model, anatomy)
+    joints = add_joints(model, anatomy, source.efforts, notes)
+    feet = [anatomy.bodies.index(b) for b in anatomy.feet]
+    puppet = KinematicModel(anatomy.spec, feet, *joints, in_plane(model, anatomy.root))
     start = first_pose(puppet, model, anatomy)
     puppet.turn(yaw_to(find_forward(puppet, start, choices.forward, notes)))
     rest = puppet.qpos(np.zeros(len(puppet.joints))) if source.up else None
@@ -138,10 +136,9 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
             f'"{model.body(anatomy.root).name}" lies on the floor, and all of it that is not a foot '
             "falls through: this has no legs to walk on"
         )
-    feet = {name for foot in best.feet for name in foot}
-    steady_balance(best.drive, best.puppet.names, best.model, best.qpos, feet, best.notes)
+    soles = {name for foot in best.feet for name in foot}
+    steady_balance(best.drive, best.puppet.names, best.puppet.model, best.qpos, soles, best.notes)
     name = plain_names([choices.name or path.stem], ["creature"])[0].strip(".-") or "creature"
-    check_same(model, anatomy, best.puppet, best.model)
     if rest is not None:
         rest[:3] = best.qpos[:3]
     return _folder(name, one_line(path.name), best, mirror, planar, rest)
@@ -192,9 +189,7 @@ def _folder(
 ) -> Imported:
     """Write the texts of the folder. rest: [nq] rest pose of a skeleton, None for other models."""
     puppet, notes = best.puppet, best.notes
-    feet = [geom for foot in best.feet for geom in foot]
-    trunk = puppet.bodies[0].name
-    notes.guess("trunk", trunk, "high", "the body that all limbs hang on")
+    notes.guess("trunk", puppet.bodies[0].name, "high", "the body that all limbs hang on")
     notes.guess(
         "feet",
         f"{len(best.feet)} feet",
@@ -202,35 +197,30 @@ def _folder(
         "limbs that end lowest",
     )
     pairs = {} if mirror is None else _stated_pairs(puppet, best.q, mirror, planar)
-    forward = rotation(puppet.bodies[0].quat).T @ [1.0, 0.0, 0.0]
-    if stopped := [joint.name for joint in puppet.joints if joint.stopped]:
+    if stopped := [joint.name for joint in puppet.joints if joint.limited == 1]:
         notes.change(
             f"limits act on {listed(stopped)} only",
             "these stand at the end of their range and rest on it",
         )
     puppet.pose(best.q)
     passing = planar and bool(geometry.parallel(puppet.data.xaxis[1:]).all())
-    length = _stated_length(best)
-    train = _train(best, mirror is not None, length)
+    hip, length = _sizes(best)
+    shorter = length < hip
+    if shorter:
+        # Speeds count in body lengths: a biped measured from its back to its toes would score well
+        # for shuffling.
+        length = hip
+        why = "the hip height: the body is shorter than its legs, and speeds count in it"
+        notes.guess("body_length", f"{hip:.3g}", "medium", why)
+    train = _train(best, mirror is not None, hip, length)
     toml = creature_toml(
-        name,
-        origin,
-        trunk,
-        forward,
-        feet,
-        puppet.names,
-        best.drive,
-        (mirror is not None, pairs),
-        length,
-        passing,
-        train,
-        notes,
+        name, origin, best, mirror is not None, pairs, length if shorter else None, passing, train
     )
     report = (
         f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
     )
     files = {
-        XML: creature_xml(name, puppet.bodies, best.qpos, rest),
+        XML: creature_xml(puppet.spec, name, best.qpos, rest),
         TOML: toml,
         README: report,
     }
@@ -255,36 +245,19 @@ def _stated_pairs(
     }
 
 
-def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> Settings:
-    """Return the table `[train]`. stated_length: m, of a body shorter than its legs."""
-    model, data = best.model, mujoco.MjData(best.model)
+def _sizes(best: Candidate) -> tuple[float, float]:
+    """Hip height and body length in m in the standing pose."""
+    model, data = best.puppet.model, mujoco.MjData(best.puppet.model)
     data.qpos[:] = best.qpos
     mujoco.mj_kinematics(model, data)
-    length = stated_length or geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
-    hip = stance_of(best.puppet, best.qpos[7:]).hip
-    steps = bool(best.drive.ahead or best.drive.aside)
-    step = float(model.opt.timestep)
-    rotor = float(np.median([joint.armature for joint in best.puppet.joints]))
-    legs, hinges, mass = len(best.puppet.feet), len(best.puppet.joints), best.puppet.mass
+    length = geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
+    return stance_of(best.puppet, best.qpos[7:]).hip, length
+
+
+def _train(best: Candidate, symmetric: bool, hip: float, length: float) -> Settings:
+    """Return the table `[train]`. hip, length: m, of the hip height and the body."""
+    puppet, steps = best.puppet, bool(best.drive.ahead or best.drive.aside)
+    step, mass = float(puppet.model.opt.timestep), puppet.mass
+    rotor = float(np.median([joint.armature for joint in puppet.joints]))
+    legs, hinges = len(puppet.feet), len(puppet.joints)
     return manner(steps, legs, hinges, symmetric, hip, length, mass, step, rotor, best.notes)
-
-
-def _stated_length(best: Candidate) -> float | None:
-    """Body length in m of a body shorter than its legs, such as a biped; None for all others.
-
-    Target and measured speeds are in body lengths. A biped measured from its back to its toes would
-    score well for shuffling.
-    """
-    model, data = best.model, mujoco.MjData(best.model)
-    data.qpos[:] = best.qpos
-    mujoco.mj_kinematics(model, data)
-    hip = stance_of(best.puppet, best.qpos[7:]).hip
-    if geometry.body_length(model, data, np.array([1.0, 0.0, 0.0])) >= hip:
-        return None
-    best.notes.guess(
-        "body_length",
-        f"{hip:.3g}",
-        "medium",
-        "the hip height: the body is shorter than its legs, and speeds count in it",
-    )
-    return hip

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.parts import Notes, listed
+from mjxgait.importer.notes import Notes, listed
 from mjxgait.importer.soles import Stance
 
 GRAVITY = 9.81
@@ -103,7 +103,7 @@ def plan_drive(
     own = np.maximum(
         weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH)), SWING * quick
     )
-    stated = np.array([joint.effort for joint in puppet.joints])
+    stated = puppet.effort
     # The file's torque is used where it is plausible for a walk: 0 and 1000 N·m often mean
     # "unknown".
     torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)

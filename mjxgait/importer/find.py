@@ -6,9 +6,11 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.creature.geometry import ancestors
+from mjxgait.creature.geometry import ancestors, subtree
 from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import (
+    HINGE,
+    SLIDE,
     Anatomy,
     find_root,
     measured,
@@ -22,7 +24,9 @@ from mjxgait.importer.legs import (
     lowered_limbs,
     movable_joints,
 )
-from mjxgait.importer.parts import HINGE, SLIDE, Notes, listed
+from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.shapes import shapes_of
+from mjxgait.importer.spec import copy_bodies
 
 MOST_BODIES, MOST_JOINTS = 400, 60
 ENOUGH = 6
@@ -48,17 +52,20 @@ def find_anatomy(
     """
     _check_size(model)
     root = find_root(model)
-    bodies = [b for b in range(1, model.nbody) if root in ancestors(model, b)]
+    bodies = subtree(model, root)
     scale = unit_length(model, bodies, notes)
     qpos = _reference_pose(model)
     axis = up_axis(model, bodies, root, qpos, up, notes)
-    anatomy = measured(model, qpos, axis, root, bodies, scale)
+    spec = copy_bodies(model, bodies, scale)
+    shapes = {b: shapes_of(spec, spec.bodies[i + 1], i) for i, b in enumerate(bodies)}
+    anatomy = measured(model, qpos, axis, scale, spec, shapes)
     tell_root_joints(model, root, notes)
     movable = movable_joints(model, anatomy, coupled, freeze, notes)
     try:
         anatomy.feet = find_feet(model, anatomy, movable)
     except NoLegs as error:
-        anatomy = measured(model, lowered_limbs(model, anatomy, movable), axis, root, bodies, scale)
+        lowered = lowered_limbs(model, anatomy, movable)
+        anatomy = measured(model, lowered, axis, scale, spec, shapes)
         anatomy.lowered = True
         anatomy.feet = find_feet(model, anatomy, movable)
         if len(anatomy.feet) < 2:  # an arm on its base can reach down too
@@ -138,8 +145,7 @@ def _freeze_least(
     for foot in anatomy.feet:
         chain = ancestors(model, foot)
         leg = [j for j in anatomy.active if int(model.jnt_bodyid[j]) in chain]
-        below = [b for b in anatomy.bodies if foot in ancestors(model, b)]
-        ends = data.xpos[below]
+        ends = data.xpos[subtree(model, foot)]
 
         def reach(joint: int, ends: np.ndarray = ends) -> float:
             arms = ends - data.xanchor[joint]

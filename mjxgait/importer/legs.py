@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.creature.geometry import ancestors
+from mjxgait.creature.geometry import ancestors, subtree
 from mjxgait.errors import UserError
-from mjxgait.importer.anatomy import Anatomy
-from mjxgait.importer.parts import FREE, HINGE, SLIDE, Notes, Shape, listed
+from mjxgait.importer.anatomy import FREE, HINGE, SLIDE, Anatomy
+from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.shapes import Shape
 
 SAME_LEVEL = 0.2
 """Share of the creature's height: limbs that end this close to the lowest point are legs."""
@@ -82,7 +83,7 @@ def find_feet(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> li
     segments: dict[int, list[int]] = {}
     for b in anatomy.bodies:
         segments.setdefault(_segment(model, b, movers), []).append(b)
-    ends = [b for b in movers if not any(c != b and b in ancestors(model, c) for c in movers)]
+    ends = _ends(model, movers)
     floor = min(anatomy.low(model, inside) for inside in segments.values())
     top = max(float(anatomy.xpos[b][2]) for b in anatomy.bodies)
     span = float(np.ptp(anatomy.xpos[anatomy.bodies], axis=0).max())
@@ -90,12 +91,10 @@ def find_feet(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> li
     ends = _without_toes(model, anatomy, ends, movers)
     ends = [b for b in ends if not _named_otherwise(model, b, movers)] or ends
     feet = sorted(
-        b
-        for b in ends
-        if anatomy.low(model, _below(model, anatomy, b)) <= floor + SAME_LEVEL * height
+        b for b in ends if anatomy.low(model, subtree(model, b)) <= floor + SAME_LEVEL * height
     )
     if not feet:
-        lowest = min(ends, key=lambda b: anatomy.low(model, _below(model, anatomy, b)))
+        lowest = min(ends, key=lambda b: anatomy.low(model, subtree(model, b)))
         raise NoLegs(
             f'no limb reaches the floor: "{model.body(anatomy.root).name}" itself lies lowest, the '
             f'lowest limb "{model.body(lowest).name}" '
@@ -124,8 +123,9 @@ def _segment(model: mujoco.MjModel, body: int, movers: set[int]) -> int:
     return -1
 
 
-def _below(model: mujoco.MjModel, anatomy: Anatomy, body: int) -> list[int]:
-    return [b for b in anatomy.bodies if body in ancestors(model, b)]
+def _ends(model: mujoco.MjModel, movers: set[int]) -> list[int]:
+    """Moving bodies without another one below."""
+    return [b for b in movers if movers.isdisjoint(subtree(model, b)[1:])]
 
 
 def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> np.ndarray:
@@ -135,9 +135,10 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
     """
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     data.qpos[:] = anatomy.qpos
-    up = anatomy.xrot[anatomy.root] @ _world_rotation(model, anatomy.qpos, anatomy.root).T
+    mujoco.mj_kinematics(model, data)
+    up = anatomy.xrot[anatomy.root] @ data.xmat[anatomy.root].reshape(3, 3).T
     movers = {int(model.jnt_bodyid[j]) for j in movable}
-    for end in (b for b in movers if not any(c != b and b in ancestors(model, c) for c in movers)):
+    for end in _ends(model, movers):
         joints = [
             j
             for j in movable
@@ -145,7 +146,7 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
         ]
         adr = model.jnt_qposadr[joints]
         low, high = _reach(model, joints, data.qpos[adr])
-        clouds = [(b, s) for b in _below(model, anatomy, end) for s in anatomy.shapes[b]]
+        clouds = [(b, s) for b in subtree(model, end) for s in anatomy.shapes[b]]
 
         def height(
             q: np.ndarray,
@@ -194,13 +195,6 @@ def _descended(
                 if (found := height(tried)) < lowest - TINY:
                     q, lowest, moved = tried, found, True
     return q
-
-
-def _world_rotation(model: mujoco.MjModel, qpos: np.ndarray, body: int) -> np.ndarray:
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
-    return data.xmat[body].reshape(3, 3)
 
 
 def _without_toes(

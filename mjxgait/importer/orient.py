@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.parts import Confidence, Notes, listed
+from mjxgait.importer.notes import Confidence, Notes, listed
 
 FRONT_WORDS, BACK_WORDS = (
     ("front", "fore", "head", "nose", "neck", "snout"),
@@ -174,10 +174,7 @@ def planar_pairs(puppet: KinematicModel, q: np.ndarray) -> tuple[np.ndarray, np.
         return None
     for a, b in zip(own, others, strict=True):
         apart = (puppet.data.xanchor[a + 1] - puppet.data.xanchor[b + 1])[[0, 2]]
-        same = (
-            puppet.joints[a].low == puppet.joints[b].low
-            and puppet.joints[a].high == puppet.joints[b].high
-        )
+        same = puppet.low[a] == puppet.low[b] and puppet.high[a] == puppet.high[b]
         if (
             np.linalg.norm(apart) > 0.05 * float(np.ptp(puppet.data.xpos[1:], axis=0).max() + 1e-6)
             or not same

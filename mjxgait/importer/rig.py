@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from mjxgait.animation.clips.clip import Rig
-from mjxgait.importer.parts import Confidence
+from mjxgait.importer.notes import Confidence
 
 MIDDLE = 0.02
 """Share of the skeleton's span within which a bone begins in the middle."""

@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 
-from mjxgait.creature.geometry import quaternion, rotation
-from mjxgait.importer.parts import GEOM, Body, Notes, Shape
-from mjxgait.importer.skeleton import Tip, foot_tips, tip_points
+from mjxgait.creature.geometry import rotation
+from mjxgait.importer.body import KinematicModel, Tip, tip_points
+from mjxgait.importer.notes import Notes
+from mjxgait.importer.shapes import Bar, Shape, bar, is_drawn, mark
 
-SPHERE, CAPSULE = int(GEOM.mjGEOM_SPHERE), int(GEOM.mjGEOM_CAPSULE)
 BAND = 0.03
 """Share of the hip height within which points count as the sole."""
 STEEP = 0.5
@@ -18,6 +18,9 @@ SMALL_FOOT, NARROW_FOOT = 0.12, 0.07
 NEAR_FLOOR = 0.1
 """Share of the hip height below which a part other than a foot may not collide."""
 MOST_TRUNK_SHAPES = 3
+ROUND = ("sphere", "capsule")
+UPPER_END = "_upper_end"
+"""In the names of balls at the upper ends of capsules on which the creature stands."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -32,60 +35,65 @@ class Stance:
     floor: float
     hip: float
 
+    def clearance(self, shape: Shape | Bar) -> float:
+        """Height in m of a shape's lowest point above the floor."""
+        heights = (self.xpos[shape.body] + shape.points @ self.xrot[shape.body].T)[:, 2]
+        return float(heights.min() - shape.radius - self.floor)
+
 
 def lay_soles(
-    bodies: list[Body], groups: list[list[int]], stance: Stance, planar: bool, notes: Notes
+    puppet: KinematicModel, stance: Stance, planar: bool, notes: Notes
 ) -> list[list[str]]:
-    """Add foot geoms to `bodies`, and return their names for each foot.
-
-    groups: places of each foot's last moving body and the bodies welded to it.
-    """
+    """Add foot geoms to the editable model, and return their names for each foot."""
     names = []
-    for group in groups:
-        made = _sole(bodies, group, stance, planar, notes)
-        for n, (i, shape) in enumerate(made):
-            shape.name = f"{bodies[group[0]].name}_foot" + (f"_{n + 1}" if len(made) > 1 else "")
-            if not any(shape is s for s in bodies[i].shapes):
-                bodies[i].shapes.append(shape)
-        names.append([shape.name for _, shape in made])
+    for group in range(len(puppet.feet)):
+        made = _sole(puppet, group, stance, planar, notes)
+        name = f"{puppet.bodies[puppet.feet[group][0]].name}_foot"
+        own = [name + (f"_{n + 1}" if len(made) > 1 else "") for n in range(len(made))]
+        for name, shape in zip(own, made, strict=True):
+            _put(puppet, shape, name)
+        names.append(own)
     return names
 
 
+def _put(puppet: KinematicModel, shape: Shape | Bar, name: str = "") -> None:
+    """Let a shape touch the floor under a name."""
+    if isinstance(shape, Bar):
+        shape.added(puppet.bodies[shape.body], name)
+    else:
+        mark(shape.geom, True, shape.seen)
+        shape.geom.name = name or shape.geom.name
+
+
 def _sole(
-    bodies: list[Body], group: list[int], stance: Stance, planar: bool, notes: Notes
-) -> list[tuple[int, Shape]]:
-    """Shapes of one foot and the places of their bodies; old shapes only stay visible."""
-    name = bodies[group[0]].name
-    owned = [(i, s) for i in group for s in bodies[i].shapes]
-    solid = [tip for tip in foot_tips(bodies, group) if tip.far.any()]
+    puppet: KinematicModel, foot: int, stance: Stance, planar: bool, notes: Notes
+) -> list[Shape | Bar]:
+    """Shapes of one foot; old shapes only stay visible."""
+    group, name = puppet.feet[foot], puppet.bodies[puppet.feet[foot][0]].name
+    solid = [tip for tip in puppet.tips[foot] if tip.far.any()]
     if not solid:
-        i = group[-1]
-        ball = _ball(bodies[i], np.zeros(3), 0.03 * stance.hip)
+        last = puppet.bodies[group[-1]]
         notes.change(
-            f'a sphere added to "{bodies[i].name}"',
-            "the foot has no shape that could touch the floor",
+            f'a sphere added to "{last.name}"', "the foot has no shape that could touch the floor"
         )
-        return [(i, ball)]
+        return [Bar(group[-1], np.zeros((1, 3)), 0.03 * stance.hip, not is_drawn(last))]
     heights = [tip_points([tip], stance.xpos, stance.xrot)[:, 2].min() for tip in solid]
     band = BAND * stance.hip
     low = [tip for tip, h in zip(solid, heights, strict=True) if h <= min(heights) + band]
-    for _, s in owned:
-        s.seen, s.solid = s.seen or (s.solid and not any(o.seen for _, o in owned)), False
-    round_only = all(t.shape.kind in (SPHERE, CAPSULE) for t in low) and len(low) <= 4
-    made = (
-        [_round_foot(bodies, t, stance, notes) for t in low]
-        if round_only
-        else _fitted(bodies, low, group[0], stance, band)
-    )
-    if not round_only:
-        what = " and ".join(sorted({_kind_name(t.shape.kind) for t in low}))
-        shapes = " and ".join(sorted({_kind_name(s.kind) for _, s in made}))
+    _only_seen([s for i in group for s in puppet.shapes[i]])
+    made: list[Shape | Bar]
+    if all(t.shape.kind in ROUND for t in low) and len(low) <= 4:
+        made = [_round_foot(puppet, t, stance, notes) for t in low]
+    else:
+        made = _fitted(puppet, low, group[0], stance, band)
+        what = " and ".join(sorted({t.shape.kind for t in low}))
+        shapes = " and ".join(sorted({s.kind for s in made}))
         notes.change(
             f'foot "{name}": {len(made)} {shapes} in place of its {what}',
             "spheres and capsules touch the floor fastest and most smoothly",
         )
     if planar:
-        made = _across(bodies, made, stance)
+        made = _across(made, stance)
         notes.change(
             f'foot "{name}" widened across to {2 * stance.hip:.2g} m',
             "the body lives in a plane; wide feet keep it from tipping sideways",
@@ -93,209 +101,117 @@ def _sole(
     return made
 
 
-def _kind_name(kind: int) -> str:
-    return GEOM(kind).name.removeprefix("mjGEOM_").lower()
+def _only_seen(shapes: list[Shape]) -> None:
+    """Let no shape touch the floor; one of them stays visible where none was."""
+    for s in shapes:
+        mark(s.geom, False, s.seen or (s.solid and not any(o.seen for o in shapes)))
 
 
-def _ball(body: Body, pos: np.ndarray, radius: float, seen: bool = False) -> Shape:
-    size = np.array([radius, 0.0, 0.0])
-    return Shape(
-        SPHERE,
-        size,
-        pos,
-        np.array([1.0, 0, 0, 0]),
-        _colour(body),
-        pos[None],
-        radius,
-        True,
-        seen or not _drawn(body),
-    )
-
-
-def bar(body: Body, a: np.ndarray, b: np.ndarray, radius: float) -> Shape:
-    """Return a capsule between two points [3] of the body's frame."""
-    along = b - a
-    length = float(np.linalg.norm(along))
-    if length < 1e-6:
-        return _ball(body, (a + b) / 2, radius)
-    z = along / length
-    x = np.cross(z, np.eye(3)[int(np.abs(z).argmin())])
-    x /= np.linalg.norm(x)
-    quat = quaternion(np.stack([x, np.cross(z, x), z], axis=1))
-    size = np.array([radius, length / 2, 0.0])
-    return Shape(
-        CAPSULE,
-        size,
-        (a + b) / 2,
-        quat,
-        _colour(body),
-        np.stack([a, b]),
-        radius,
-        True,
-        not _drawn(body),
-    )
-
-
-def _drawn(body: Body) -> bool:
-    return any(s.seen for s in body.shapes)
-
-
-def _colour(body: Body) -> np.ndarray:
-    return body.shapes[0].rgba if body.shapes else np.array([0.3, 0.3, 0.3, 1.0])
-
-
-def _round_foot(bodies: list[Body], tip: Tip, stance: Stance, notes: Notes) -> tuple[int, Shape]:
+def _round_foot(puppet: KinematicModel, tip: Tip, stance: Stance, notes: Notes) -> Shape | Bar:
     """Return the foot shape of a sphere or capsule.
 
     A sphere or a lying capsule stays as it is. A steep capsule becomes a ball at its lower end; a
     ball at its upper end may not touch the floor.
     """
-    i, shape = tip.body, tip.shape
+    shape, i = tip.shape, tip.shape.body
     world = stance.xpos[i] + shape.points @ stance.xrot[i].T
     slope = abs(world[0, 2] - world[-1, 2]) / max(float(np.linalg.norm(world[0] - world[-1])), 1e-9)
-    if shape.kind == SPHERE or (slope < STEEP and tip.far.all()):
-        shape.solid = True
-        return i, shape
-    lower, upper = (shape.points[k] for k in np.argsort(world[:, 2])[[0, -1]])
-    knee = _ball(bodies[i], upper, shape.radius)
-    count = sum(s.name.startswith(f"{bodies[i].name}_upper_end") for s in bodies[i].shapes)
-    knee.name, knee.seen = f"{bodies[i].name}_upper_end" + (f"_{count + 1}" if count else ""), False
-    bodies[i].shapes.append(knee)
+    if shape.kind == "sphere" or (slope < STEEP and tip.far.all()):
+        return shape
+    lower, upper = (shape.points[[k]] for k in np.argsort(world[:, 2])[[0, -1]])
+    body = puppet.bodies[i]
+    knee = body.name + UPPER_END
+    count = sum(geom.name.startswith(knee) for geom in body.geoms)
+    seen = not is_drawn(body)
+    _put(puppet, Bar(i, upper, shape.radius, False), knee + (f"_{count + 1}" if count else ""))
     notes.change(
-        f'foot "{bodies[i].name}": the lower end of its capsule',
+        f'foot "{body.name}": the lower end of its capsule',
         "it touches the floor there; the upper end counts as a knee",
     )
-    return i, _ball(bodies[i], lower, shape.radius)
+    return Bar(i, lower, shape.radius, seen)
 
 
 def _fitted(
-    bodies: list[Body], low: list[Tip], home: int, stance: Stance, band: float
-) -> list[tuple[int, Shape]]:
+    puppet: KinematicModel, low: list[Tip], home: int, stance: Stance, band: float
+) -> list[Shape | Bar]:
     """Spheres or capsules with the footprint of the low points as their lower side."""
     world = tip_points(low, stance.xpos, stance.xrot)
     thick = float(np.ptp(world[:, 2]))
     bottom = float(world[:, 2].min())
     sole = world[world[:, 2] <= bottom + band]
-    low_corner, high_corner = sole.min(0), sole.max(0)
-    length, width = (float(v) for v in (high_corner - low_corner)[:2])
+    low_corner, high_corner = sole.min(0)[:2], sole.max(0)[:2]
+    length, width = (float(v) for v in high_corner - low_corner)
     middle = (low_corner + high_corner) / 2
-    at, turn = stance.xpos[home], stance.xrot[home]
-
-    def local(x: float, y: float, radius: float) -> np.ndarray:
-        return turn.T @ (np.array([x, y, bottom + radius]) - at)
-
+    seen = not is_drawn(puppet.bodies[home])
     least, most = 0.01 * stance.hip, max(thick / 2, 0.015 * stance.hip)
+
+    def laid(radius: float, *ends: tuple[float, float]) -> Bar:
+        points = np.array([[x, y, bottom + radius] for x, y in ends]) - stance.xpos[home]
+        local = points @ stance.xrot[home]
+        return bar(home, local[0], local[-1], radius, seen)
+
     if max(length, width) < SMALL_FOOT * stance.hip:
         radius = float(np.clip(max(length, width) / 2, least, max(thick / 2, 0.04 * stance.hip)))
-        return [(home, _ball(bodies[home], local(middle[0], middle[1], radius), radius))]
-    radius = float(np.clip(min(length, width) / 2, least, most))
-    ends_x = (low_corner[0] + radius, high_corner[0] - radius)
-    ends_y = (low_corner[1] + radius, high_corner[1] - radius)
+        return [laid(radius, (middle[0], middle[1]))]
+    narrow = min(length, width) < NARROW_FOOT * stance.hip
+    radius = float(np.clip(min(length, width) / (2 if narrow else 6), least, most))
+    (x, y), (to_x, to_y) = low_corner + radius, high_corner - radius
     if width < NARROW_FOOT * stance.hip:
-        return [
-            (
-                home,
-                bar(
-                    bodies[home],
-                    local(ends_x[0], middle[1], radius),
-                    local(ends_x[1], middle[1], radius),
-                    radius,
-                ),
-            )
-        ]
-    if length < NARROW_FOOT * stance.hip:
-        return [
-            (
-                home,
-                bar(
-                    bodies[home],
-                    local(middle[0], ends_y[0], radius),
-                    local(middle[0], ends_y[1], radius),
-                    radius,
-                ),
-            )
-        ]
-    radius = float(np.clip(min(length, width) / 6, least, most))
-    ends_x = (low_corner[0] + radius, high_corner[0] - radius)
-    ends_y = (low_corner[1] + radius, high_corner[1] - radius)
-    return [
-        (home, bar(bodies[home], local(ends_x[0], y, radius), local(ends_x[1], y, radius), radius))
-        for y in ends_y
-    ]
+        return [laid(radius, (x, middle[1]), (to_x, middle[1]))]
+    if narrow:
+        return [laid(radius, (middle[0], y), (middle[0], to_y))]
+    return [laid(radius, (x, side), (to_x, side)) for side in (y, to_y)]
 
 
-def _across(
-    bodies: list[Body], made: list[tuple[int, Shape]], stance: Stance
-) -> list[tuple[int, Shape]]:
+def _across(made: list[Shape | Bar], stance: Stance) -> list[Shape | Bar]:
     """Replace each ball and each end of a capsule by a long capsule across.
 
     Nothing changes in the creature's plane.
     """
-    wide = []
-    for i, shape in made:
-        shape.solid = False
-        if any(shape is s for s in bodies[i].shapes):
-            shape.seen = True
-        across = stance.xrot[i].T @ [0.0, stance.hip, 0.0]
-        for point in shape.points:
-            beam = bar(bodies[i], point - across, point + across, shape.radius)
-            beam.seen = False
-            wide.append((i, beam))
+    wide: list[Shape | Bar] = []
+    for shape in made:
+        if isinstance(shape, Shape):
+            mark(shape.geom, False, True)
+        across = stance.xrot[shape.body].T @ [0.0, stance.hip, 0.0]
+        wide += [
+            bar(shape.body, point - across, point + across, shape.radius, False)
+            for point in shape.points
+        ]
     return wide
 
 
-def guard_parts(
-    bodies: list[Body],
-    feet: list[list[int]],
-    trunk: list[int],
-    segments: list[list[int]],
-    stance: Stance,
-    notes: Notes,
-) -> None:
+def guard_parts(puppet: KinematicModel, stance: Stance, notes: Notes) -> None:
     """Give all parts but the feet a few spheres and capsules; if they touch, the episode ends."""
-    on_feet = {i for group in feet for i in group}
+    on_feet = {i for group in puppet.feet for i in group}
     lowered = []
-    for segment in segments:
+    for segment in puppet.segments():
         if on_feet & set(segment):
             continue
-        most = MOST_TRUNK_SHAPES if segment == trunk else 1
-        owned = [(i, s) for i in segment for s in bodies[i].shapes]
-        chosen = [(i, s) for i, s in owned if s.solid] or (
-            [(i, s) for i, s in owned if s.seen] if segment == trunk else []
-        )
-        chosen.sort(
-            key=lambda pair: -float(np.ptp(pair[1].points, axis=0).max() + 2 * pair[1].radius)
-        )
-        for i, s in owned:
-            s.seen, s.solid = s.seen or (s.solid and not _drawn(bodies[i])), False
-        for i, s in chosen[:most]:
-            guard = s if s.kind in (SPHERE, CAPSULE) else _inscribed(bodies[i], s)
-            clearance = (
-                (stance.xpos[i] + guard.points @ stance.xrot[i].T)[:, 2].min()
-                - guard.radius
-                - stance.floor
-            )
-            if clearance < NEAR_FLOOR * stance.hip:
-                lowered.append(bodies[i].name)
+        most = MOST_TRUNK_SHAPES if segment == puppet.trunk else 1
+        owned = [s for i in segment for s in puppet.shapes[i]]
+        chosen = [s for s in owned if s.solid]
+        if not chosen and segment == puppet.trunk:
+            chosen = [s for s in owned if s.seen]
+        chosen.sort(key=lambda s: -float(np.ptp(s.points, axis=0).max() + 2 * s.radius))
+        for i in segment:
+            _only_seen(puppet.shapes[i])
+        for s in chosen[:most]:
+            guard = s if s.kind in ROUND else _inscribed(s)
+            name = puppet.bodies[s.body].name
+            if stance.clearance(guard) < NEAR_FLOOR * stance.hip:
+                lowered.append(name)
                 continue
-            guard.solid = True
+            _put(puppet, guard)
             if guard is not s:
-                bodies[i].shapes.append(guard)
                 notes.change(
-                    f'"{bodies[i].name}": a {_kind_name(guard.kind)} in place of its '
-                    f"{_kind_name(s.kind)}",
+                    f'"{name}": a {guard.kind} in place of its {s.kind}',
                     "for touching the floor",
                 )
-    for body in bodies:
-        for shape in body.shapes:  # knee balls of feet collide only if they are high enough
-            if "_upper_end" in shape.name:
-                i = bodies.index(body)
-                height = (
-                    (stance.xpos[i] + shape.points @ stance.xrot[i].T)[:, 2].min()
-                    - shape.radius
-                    - stance.floor
-                )
-                shape.solid = bool(height > NEAR_FLOOR * stance.hip)
+    for i, body in enumerate(puppet.bodies):
+        for geom in body.geoms:  # knee balls of feet collide only if they are high enough
+            if UPPER_END in geom.name:
+                ball = Bar(i, geom.pos[None], float(geom.size[0]), False)
+                mark(geom, stance.clearance(ball) > NEAR_FLOOR * stance.hip, False)
     if lowered:
         notes.change(
             f"{', '.join(dict.fromkeys(lowered))} do not collide",
@@ -303,17 +219,15 @@ def guard_parts(
         )
 
 
-def _inscribed(body: Body, shape: Shape) -> Shape:
+def _inscribed(shape: Shape) -> Bar:
     """Return a capsule along the longest side of the shape's box, a little thinner than it."""
-    turn = rotation(shape.quat)
-    local = (shape.points - shape.pos) @ turn
+    pos, turn = shape.geom.pos, rotation(shape.geom.quat)
+    local = (shape.points - pos) @ turn
     low, high = local.min(0), local.max(0)
     half, middle = (high - low) / 2, (low + high) / 2
     longest = int(half.argmax())
     radius = max(float(np.delete(half, longest).min()), 1e-3)
     reach = max(float(half[longest]) - radius, 0.0)
     axis = np.eye(3)[longest] * reach
-    a, b = (shape.pos + turn @ (middle + sign * axis) for sign in (-1, 1))
-    made = bar(body, a, b, radius)
-    made.seen = False
-    return made
+    a, b = (pos + turn @ (middle + sign * axis) for sign in (-1, 1))
+    return bar(shape.body, a, b, radius, False)

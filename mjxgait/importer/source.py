@@ -15,7 +15,7 @@ import mujoco
 
 from mjxgait.errors import UserError
 from mjxgait.files import read_bytes
-from mjxgait.importer.parts import Guess, Notes
+from mjxgait.importer.notes import Guess, Notes
 
 MOST_XML = 4_000_000
 MOST_MESH = 30_000_000
@@ -36,7 +36,7 @@ class Source:
     efforts: N·m, largest torque by joint name, if stated outside MuJoCo's elements.
     coupled: joints that follow others.
     poses: standing poses that the file offers outside keyframes.
-    missing: names of unavailable meshes, each with its expected file; MJCF only.
+    missing: keys of unavailable meshes, each with its expected file; MJCF only.
     up: axis that points up, of a skeleton.
     """
 
@@ -47,11 +47,6 @@ class Source:
     poses: list[list[float]] = dataclasses.field(default_factory=list)
     missing: dict[str, str] = dataclasses.field(default_factory=dict)
     up: Guess | None = None
-
-    @property
-    def urdf(self) -> bool:
-        """True for a URDF, False for an MJCF file."""
-        return self.tree.tag == "robot"
 
 
 class Places:
@@ -171,34 +166,26 @@ def numbers(text: str | None) -> list[float] | None:
     return values if values and all(map(math.isfinite, values)) else None
 
 
-SMALL = "0 0 0 1e-3 0 0 0 1e-3 0 0 0 1e-3"
-"""m; corners of the stand-in for a mesh until its shapes are removed."""
-
-
-def put_stand_in(mesh: ET.Element) -> None:
-    """Replace an MJCF mesh by a small one without a file, so that the model can be read."""
-    name = mesh.get("name", "")
-    mesh.attrib.clear()
-    mesh.attrib.update(name=name, vertex=SMALL)
-
-
 def leave_out(spec: mujoco.MjSpec, missing: Mapping[str, str]) -> None:
     """Remove meshes and their shapes from a model that has been read.
 
     Args:
-      missing: mesh names, each with the file that it should have come from.
+      missing: files of the meshes, each with its name in the original file; "" if it can be found
+        but not read.
 
     Raises:
       UserError: a shape's mass counts; names the mass, as far as the file states it.
     """
+    files = {mesh.name: mesh.file for mesh in spec.meshes if mesh.file in missing}
     for geom in list(spec.geoms):
-        if geom.meshname in missing:
+        if geom.meshname in files:
             if _counts(spec, geom):
-                raise lost(geom.name, geom.parent.name, missing[geom.meshname], geom.mass)
+                unreadable = f"{geom.meshname} (it is there, but not as MuJoCo wants it)"
+                file = missing[files[geom.meshname]] or unreadable
+                raise lost(geom.name, geom.parent.name, file, geom.mass)
             spec.delete(geom)
-    for mesh in list(spec.meshes):
-        if mesh.name in missing:
-            spec.delete(mesh)
+    for name in files:
+        spec.delete(spec.mesh(name))
 
 
 def _counts(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:

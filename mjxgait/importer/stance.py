@@ -5,9 +5,8 @@ Letters: `J` active joints, `F` feet.
 
 import numpy as np
 
-from mjxgait.creature.geometry import quaternion, rotation
+from mjxgait.creature.geometry import rotation
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.skeleton import height_of
 from mjxgait.importer.soles import Stance
 
 SPREADS = (0.4, 1.0, 1.6)
@@ -118,7 +117,7 @@ class Search:
         if not lying and len(puppet.feet) == 1:
             # A body on one foot needs its whole sole, even if the shank reaches the floor.
             lying = self._lying(stance_of(puppet, self._straightest()), straight=True)
-            above = {puppet.bodies[puppet.feet[f][0]].parent for f in lying} - {0}
+            above = {int(puppet.parent[puppet.feet[f][0]]) for f in lying} - {0}
             self.segments = [s for s in self.segments if not set(s) & above]
         self.flat, self.ups = list(lying), list(lying.values())
         self.legs = [puppet.leg(f) for f in range(len(puppet.feet))]
@@ -189,7 +188,7 @@ class Search:
             [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * hip].mean(0) for sole in soles]
         )
         beside = (puppet.centre_of_mass() - middles.mean(0))[:2] / hip
-        others = [height_of(puppet.bodies, xpos, xrot, s) - floor for s in self.segments]
+        others = [puppet.lowest(xpos, xrot, s) - floor for s in self.segments]
         others.append(puppet.shank_height(xpos, xrot) - floor)
         crouched = sum(max(0.2 - h / hip, 0.0) for h in others)
         stretched = beneath = narrow = ahead = 0.0
@@ -223,11 +222,3 @@ class Search:
             + 5 * low_trunk
             + 0.2 * ((q - self.start) ** 2).mean()
         )
-
-
-def upright_quat(quat: np.ndarray) -> np.ndarray:
-    """Quaternion [4] with the same tilt and no turn about z."""
-    matrix = rotation(quat)
-    yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
-    back = np.array([[np.cos(yaw), np.sin(yaw), 0], [-np.sin(yaw), np.cos(yaw), 0], [0, 0, 1.0]])
-    return quaternion(back @ matrix)

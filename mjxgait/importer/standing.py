@@ -6,13 +6,14 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjxgait.importer.anatomy import Anatomy
+from mjxgait.importer.anatomy import HINGE, Anatomy
 from mjxgait.importer.balance import Held, hold
-from mjxgait.importer.body import KinematicModel, compile_own, creature_xml
+from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.drive import Drive, plan_drive
-from mjxgait.importer.parts import Body, Notes
+from mjxgait.importer.notes import Notes
 from mjxgait.importer.soles import guard_parts, lay_soles
 from mjxgait.importer.source import Source
+from mjxgait.importer.spec import tidy
 from mjxgait.importer.stance import (
     SPREADS,
     Search,
@@ -37,7 +38,6 @@ class Candidate:
     q: np.ndarray
     feet: list[list[str]]
     drive: Drive
-    model: mujoco.MjModel
     qpos: np.ndarray
     held: Held
     notes: Notes
@@ -76,13 +76,8 @@ def offered_poses(
 
 
 def _angles(puppet: KinematicModel, model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
-    hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
-    q = np.array(
-        [
-            qpos[model.jnt_qposadr[j.id]] if int(model.jnt_type[j.id]) == hinge else 0.0
-            for j in puppet.joints
-        ]
-    )
+    hinges = model.jnt_type[puppet.source] == HINGE
+    q = np.where(hinges, qpos[model.jnt_qposadr[puppet.source]], 0.0)
     return np.clip(q, puppet.low, puppet.high)
 
 
@@ -143,24 +138,22 @@ def _try(
     notes: Notes,
 ) -> Candidate:
     """Add foot geoms in a pose, and run the stand test."""
-    notes, bodies = copy.deepcopy(notes), copy.deepcopy(puppet.bodies)
-    trial = KinematicModel(bodies, [group[0] for group in puppet.feet])
+    notes, trial = copy.deepcopy(notes), puppet.copy()
     level(trial, q)
     drop(trial, q)
     _keep_stops(trial, q)
     stance = stance_of(trial, q)
     drive = plan_drive(trial, q, stance, planar, notes)
-    feet = lay_soles(bodies, trial.feet, stance, planar, notes)
-    guard_parts(bodies, trial.feet, trial.trunk, trial.segments(), stance, notes)
-    _name_shapes(bodies)
-    made = KinematicModel(bodies, [group[0] for group in puppet.feet])
+    feet = lay_soles(trial, stance, planar, notes)
+    guard_parts(trial, stance, notes)
+    tidy(trial.spec)
+    made = trial.copy()
     drop(made, q, SINK)
     qpos = made.qpos(q)
-    model = compile_own(creature_xml("trial", bodies, qpos))
     held = hold(
-        model, qpos, drive.kp, drive.kd, drive.torque, {name for foot in feet for name in foot}
+        made.model, qpos, drive.kp, drive.kd, drive.torque, {name for foot in feet for name in foot}
     )
-    return Candidate(made, q, feet, drive, model, qpos, held, notes)
+    return Candidate(made, q, feet, drive, qpos, held, notes)
 
 
 def _keep_stops(puppet: KinematicModel, q: np.ndarray) -> None:
@@ -169,13 +162,5 @@ def _keep_stops(puppet: KinematicModel, q: np.ndarray) -> None:
     Such a stop bears weight, like a straight knee's. Other limits are left to the controller,
     because each costs a row of the solver.
     """
-    for joint, angle in zip(puppet.joints, q, strict=True):
-        joint.stopped = bool(min(angle - joint.low, joint.high - angle) < AT_ITS_END)
-
-
-def _name_shapes(bodies: list[Body]) -> None:
-    """Name each colliding shape without a name."""
-    for body in bodies:
-        unnamed = [s for s in body.shapes if s.solid and not s.name]
-        for i, shape in enumerate(unnamed):
-            shape.name = f"{body.name}_guard" + (f"_{i + 1}" if len(unnamed) > 1 else "")
+    for joint, low, high in zip(puppet.joints, q - puppet.low, puppet.high - q, strict=True):
+        joint.limited = int(min(low, high) < AT_ITS_END)

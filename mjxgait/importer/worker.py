@@ -1,5 +1,6 @@
 """Compilation of a cleaned model, in this process or in one with limited time and memory."""
 
+import dataclasses
 import json
 import math
 import os
@@ -11,13 +12,14 @@ import sys
 import time
 import warnings
 import xml.etree.ElementTree as ET
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from mjxgait.errors import UserError
-from mjxgait.importer.source import leave_out, lost, put_stand_in
+from mjxgait.importer.source import leave_out
 from mjxgait.processes import python_command, safe_environment
 
 SECONDS, GIGABYTES = 10.0, 1.0
@@ -28,7 +30,13 @@ MOST_REPAIRS = 40
 OPTIONAL = ("actuator", "sensor", "keyframe", "tendon", "contact")
 """Sections that are dropped if the model does not compile with them."""
 UNKNOWN_ATTRIBUTE = re.compile(r"unrecognized attribute: '([^']+)'.*?Element '([^']+)'", re.DOTALL)
-ASSET = re.compile(r"asset[0-9]+\.(?:stl|obj|msh)|(?<=')asset[0-9]+(?=')")
+ASSET = re.compile(r"(asset[0-9]+)(?=\.(?:stl|obj|msh)|')")
+IMPOSSIBLE = (
+    "inertia must satisfy",
+    "mass and inertia of moving bodies",
+    "inertia must be positive",
+)
+"""MuJoCo's words about masses and inertias that it does not accept."""
 
 
 def compile_apart(
@@ -81,120 +89,99 @@ def compile_here(
     """Return the compiled model, and the changes needed to compile it with their reasons.
 
     Args:
-      missing: meshes that small ones stand in for, see `leave_out`.
+      missing: meshes that are not in `assets`, see `leave_out`.
 
     Raises:
       UserError: with MuJoCo's own words.
     """
-    changes: list[tuple[str, str]] = []
-    gone = dict(missing or {})
-    left_out = list(OPTIONAL)
+    repairs = _Repairs(tree, dict(missing or {}))
     for _ in range(MOST_REPAIRS):
         try:
             spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=assets)
             spec.compiler.fusestatic = False
             spec.compiler.discardvisual = False
-            leave_out(spec, gone)
+            leave_out(spec, repairs.missing)
+            for edit in repairs.edits:
+                edit(spec)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # about the file's style
-                return spec.compile(), changes
+                return spec.compile(), repairs.changes
         except (ValueError, TypeError, RuntimeError, mujoco.FatalError) as error:
             message = " ".join(str(error).split())
-        if not _repair(tree, message, changes, left_out, gone):
+        if not repairs.repair(message, assets):
             raise UserError(f"MuJoCo cannot read the model: {message[:400]}")
     raise UserError(f"MuJoCo cannot read the model after {MOST_REPAIRS} repairs: {message[:400]}")
 
 
-def _repair(
-    tree: ET.Element,
-    message: str,
-    changes: list[tuple[str, str]],
-    left_out: list[str],
-    gone: dict[str, str],
-) -> bool:
-    """Change the tree to avoid this message; return False if nothing is left to try."""
-    if found := UNKNOWN_ATTRIBUTE.search(message):
-        name, tag = found.groups()
-        hit = [e for e in tree.iter(tag) if name in e.attrib]
+def _raise_masses(spec: mujoco.MjSpec) -> None:
+    spec.compiler.balanceinertia = True
+    spec.compiler.boundmass, spec.compiler.boundinertia = 1e-4, 1e-6
+
+
+def _take_hulls(spec: mujoco.MjSpec) -> None:
+    for mesh in spec.meshes:
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+
+
+@dataclasses.dataclass
+class _Repairs:
+    """Repairs so far: of the tree, meshes to leave out, edits of the model that has been read."""
+
+    tree: ET.Element
+    missing: dict[str, str]
+    changes: list[tuple[str, str]] = dataclasses.field(default_factory=list)
+    edits: list[Callable[[mujoco.MjSpec], None]] = dataclasses.field(default_factory=list)
+    left_out: list[str] = dataclasses.field(default_factory=lambda: list(OPTIONAL))
+
+    def repair(self, message: str, assets: Collection[str]) -> bool:
+        """Add a repair that avoids this message; return False if nothing is left to try."""
+        if found := UNKNOWN_ATTRIBUTE.search(message):
+            return self._drop_attribute(*found.groups())
+        reason = message[:160]
+        if any(words in message for words in IMPOSSIBLE):
+            if _raise_masses in self.edits:
+                return False
+            self.edits.append(_raise_masses)
+            what = "masses and inertias raised to 1e-4 kg and 1e-6 kg m² and balanced"
+            self.changes.append((f"{what} where they were less", reason))
+            return True
+        key = self._damaged(message, assets)
+        if key:
+            self.missing[key] = ""
+            self.changes.append((f"a mesh and its shapes dropped ({key})", reason))
+            return True
+        inertia = any(word in message for word in ("volume", "orientation", "inertia"))
+        if "mesh" in message and inertia and _take_hulls not in self.edits:
+            self.edits.append(_take_hulls)
+            self.changes.append(("mesh inertias taken from the convex hulls", reason))
+            return True
+        return self._drop_section(reason)
+
+    def _drop_attribute(self, name: str, tag: str) -> bool:
+        hit = [e for e in self.tree.iter(tag) if name in e.attrib]
         for element in hit:
             del element.attrib[name]
-        changes.append(
-            (f'attribute "{name}" of <{tag}> dropped', "this version of MuJoCo does not know it")
-        )
+        what = f'attribute "{name}" of <{tag}> dropped'
+        self.changes.append((what, "this version of MuJoCo does not know it"))
         return bool(hit)
-    if any(
-        word in message
-        for word in (
-            "inertia must satisfy",
-            "mass and inertia of moving bodies",
-            "inertia must be positive",
-        )
-    ):
-        compiler = _compiler(tree)
-        if compiler.get("boundmass"):
-            return False
-        compiler.attrib.update(balanceinertia="true", boundmass="1e-4", boundinertia="1e-6")
-        changes.append(
-            (
-                "masses and inertias raised to 1e-4 kg and 1e-6 kg m² and balanced where they were "
-                "less",
-                message[:160],
-            )
-        )
-        return True
-    if (found := ASSET.search(message)) and _drop_mesh(tree, found.group(), gone):
-        changes.append((f"a mesh and its shapes dropped ({found.group()})", message[:160]))
-        return True
-    if "mesh" in message and (
-        "volume" in message or "orientation" in message or "inertia" in message
-    ):
-        meshes = [m for m in tree.iter("mesh") if m.get("inertia") != "convex"]
-        if meshes and tree.tag != "robot":
-            for mesh in meshes:
-                mesh.set("inertia", "convex")
-            changes.append(("mesh inertias taken from the convex hulls", message[:160]))
-            return True
-    while left_out:
-        section = left_out.pop(0)
-        parts = tree.findall(section)
-        for part in parts:
-            tree.remove(part)
-        if parts:
-            changes.append(
-                (f"<{section}> dropped", f"the model does not compile with it: {message[:160]}")
-            )
-            return True
-    return False
 
+    def _damaged(self, message: str, assets: Collection[str]) -> str:
+        """Key of the mesh that the message names, if it is not left out already; else ""."""
+        found = ASSET.search(message)
+        keys = [key for key in assets if found and key.startswith(f"{found.group(1)}.")]
+        return "".join(key for key in keys if key not in self.missing)
 
-def _drop_mesh(tree: ET.Element, key: str, gone: dict[str, str]) -> bool:
-    """Remove the meshes of an asset and the shapes that use them; return False if there are none.
-
-    gone: meshes replaced by small ones; those removed from MJCF are added.
-    """
-    stem = key.split(".")[0]
-    hit = [m for m in tree.iter("mesh") if m.get("file", "").split(".")[0] == stem]
-    for mesh in hit:
-        gone[mesh.get("name", "")] = f"{mesh.get('name')} (it is there, but not as MuJoCo wants it)"
-        put_stand_in(mesh)
-    for link in tree.findall("link"):
-        for shape in list(link):
-            mesh_of = shape.find("geometry/mesh")
-            if mesh_of is None or mesh_of.get("filename", "").split(".")[0] != stem:
-                continue
-            if shape.tag == "collision" and link.find("inertial") is None:
-                raise lost("", link.get("name", ""), stem)
-            link.remove(shape)
-            hit.append(mesh_of)
-    return bool(hit)
-
-
-def _compiler(tree: ET.Element) -> ET.Element:
-    home = tree
-    if tree.tag == "robot":
-        home = tree.find("mujoco")  # type: ignore[assignment]
-    found = home.findall("compiler")
-    return found[-1] if found else ET.SubElement(home, "compiler")
+    def _drop_section(self, reason: str) -> bool:
+        while self.left_out:
+            section = self.left_out.pop(0)
+            parts = self.tree.findall(section)
+            for part in parts:
+                self.tree.remove(part)
+            if parts:
+                why = f"the model does not compile with it: {reason}"
+                self.changes.append((f"<{section}> dropped", why))
+                return True
+        return False
 
 
 def _bound(seconds: float, gigabytes: float) -> None:

@@ -9,8 +9,10 @@ import tomli_w
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import Table
 from mjxgait.controllers.key_poses.config import unhurried
+from mjxgait.creature.geometry import rotation
 from mjxgait.importer.drive import Drive
-from mjxgait.importer.parts import Confidence, Notes, one_line
+from mjxgait.importer.notes import Confidence, Notes, one_line
+from mjxgait.importer.standing import Candidate
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.gaits import stride_limit
 
@@ -156,37 +158,31 @@ def _unhurried(speed: float, hip: float, length: float, time_step: float) -> int
     return unhurried(LEAST * hip / (speed * length), time_step)
 
 
-KEYS = {"forward": "forward", "feet": "feet", "trunk": "trunk"}
-
-
 def creature_toml(
     name: str,
     origin: str,
-    trunk: str,
-    forward: np.ndarray,
-    feet: list[str],
-    joints: list[str],
-    drive: Drive,
-    mirror: tuple[bool, dict[str, tuple[str, int]]],
+    best: Candidate,
+    symmetric: bool,
+    pairs: Mapping[str, tuple[str, int]],
     body_length: float | None,
     planar: bool,
     train: Table,
-    notes: Notes,
 ) -> str:
     """Return the text of creature.toml.
 
     Args:
-      origin: the model file's name, in one line. forward: [3] in the trunk's frame. feet: names of
-        geoms.
-      mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
-      planar: whether its legs are in one plane and pass each other. train: settings that differ
-        from the defaults.
-      body_length: m, None if the loader measures it.
+      origin: the model file's name, in one line. best: the creature in its standing pose. pairs:
+        stated mirror pairs, joint to partner and sign. body_length: m, None if the loader measures
+        it. planar: whether its legs are in one plane and pass each other. train: settings that
+        differ from the defaults.
     """
+    joints, drive, notes = best.puppet.names, best.drive, best.notes
+    root = best.puppet.bodies[0]
+    forward = rotation(root.quat).T @ [1.0, 0.0, 0.0]
+    feet = [_quoted(geom) for foot in best.feet for geom in foot]
     remark = {
         guess.what: f"  # {guess.confidence}: {one_line(guess.reason)}" for guess in notes.guesses
     }
-    symmetric, pairs = mirror
     about = f"imported from {origin}: {len(joints)} joints"
     lines = [
         f"# Made by `mjxgait import` from {origin}. The words after each guess say how sure it is; "
@@ -196,9 +192,9 @@ def creature_toml(
         "[creature]",
         f"name = {_quoted(name)}",
         f"description = {_quoted(about)}",
-        f"trunk = {_quoted(trunk)}{remark.get('trunk', '')}",
+        f"trunk = {_quoted(root.name)}{remark.get('trunk', '')}",
         f"forward = {[round(float(v), 6) + 0.0 for v in forward]}{remark.get('forward', '')}",
-        f"feet = [{', '.join(_quoted(foot) for foot in feet)}]{remark.get('feet', '')}",
+        f"feet = [{', '.join(feet)}]{remark.get('feet', '')}",
         'keyframe = "stand"',
     ]
     if body_length is not None:

@@ -10,7 +10,7 @@ from mjxgait.cli.import_ import write_folder
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.importer import Imported
-from mjxgait.importer.parts import Notes
+from mjxgait.importer.notes import Notes
 
 STUDY = f"""
 question = "?"

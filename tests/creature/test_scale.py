@@ -1,5 +1,6 @@
 """Scaled parts: lengths, masses and inertias follow, and the files stay the same."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -8,7 +9,7 @@ import pytest
 
 from mjxgait.api import load_creature
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import parse_scales, scaled
+from mjxgait.creature.scale import at_step, parse_scales, scaled
 from mjxgait.errors import UserError
 
 
@@ -94,6 +95,17 @@ def test_scaling_a_mesh_is_rejected(stool: Creature):
 
     with pytest.raises(UserError, match='part "trunk" has the mesh "m"'):
         scaled_files({**stool.files, "creature.xml": xml}, {"trunk": 1.2})
+
+
+def test_a_flat_part_can_be_read_again(stool: Creature):
+    """Two moments of a flat part are the third together, and MuJoCo writes six digits of each."""
+    flat = (
+        '<inertial pos="0 0 0" mass="1" diaginertia="0.00033333333 0.00033333333 0.00066666666"/>'
+    )
+    xml = stool.files["creature.xml"].replace("<freejoint", f"{flat}<freejoint", 1)
+    assert flat in xml
+    slow = at_step(replace(stool, files={**stool.files, "creature.xml": xml}), 0.004)
+    assert slow.model.body_inertia[1] == pytest.approx([1 / 3000, 1 / 3000, 2 / 3000], rel=1e-4)
 
 
 def test_the_api_scales_too(stool: Creature):

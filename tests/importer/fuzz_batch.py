@@ -1,4 +1,4 @@
-"""Runs a share of the hostile inputs: python -m importing.fuzz_batch SCRATCH SHARE SHARES.
+"""Runs a share of the hostile inputs: python -m importer.fuzz_batch SCRATCH SHARE SHARES.
 
 Prints a line before and after each.
 """

@@ -29,7 +29,7 @@ def test_every_input_gives_a_creature_or_a_sentence(tmp_path: Path, share: int, 
     os.mkfifo(outside / "secret.stl")  # who opens it waits for ever, be it C or Python
     tests = Path(__file__).parents[1]
     done = subprocess.run(
-        [sys.executable, "-m", "importing.fuzz_batch", str(tmp_path), str(share), str(shares)],
+        [sys.executable, "-m", "importer.fuzz_batch", str(tmp_path), str(share), str(shares)],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(tests)},
         capture_output=True,

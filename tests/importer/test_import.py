@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from helpers import altered, pose_champion
-from importer.models import BIPED, QUADRUPED, ROLLING
+from importer.models import BIPED, CORNERS, QUADRUPED, ROLLING
 
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
@@ -24,6 +24,9 @@ from mjxgait.importer import ImportChoices, Imported, import_model, stance
 from mjxgait.importer.portrait import facts, portrait, standing
 from mjxgait.importer.write_toml import _quoted
 from mjxgait.reference.starts import perturbed_starts
+
+DIGITS = 1e-5
+"""MuJoCo writes numbers with six digits."""
 
 
 @pytest.fixture
@@ -150,14 +153,31 @@ def test_mujoco_reads_the_same_masses_and_joints_from_both_files(tmp_path):
     before = mujoco.MjModel.from_xml_string(QUADRUPED)
     for name in creature.joints.names:
         a, b = before.joint(name), creature.model.joint(name)
-        np.testing.assert_allclose(a.axis, b.axis, atol=1e-9)
-        np.testing.assert_allclose(a.pos, b.pos, atol=1e-9)
-    np.testing.assert_allclose(before.body_mass.sum(), creature.frame.mass, rtol=1e-9)
+        np.testing.assert_allclose(a.axis, b.axis, atol=DIGITS)
+        np.testing.assert_allclose(a.pos, b.pos, atol=DIGITS)
+    np.testing.assert_allclose(before.body_mass.sum(), creature.frame.mass, rtol=DIGITS)
     np.testing.assert_allclose(
         np.sort(before.body_inertia.ravel()),
         np.sort(creature.model.body_inertia.ravel()),
-        rtol=1e-6,
+        rtol=DIGITS,
     )
+
+
+@pytest.mark.usefixtures("a_short_search")
+def test_frozen_joints_keep_what_is_below_in_its_place(tmp_path):
+    """Hips that cannot be at zero are frozen in the middle of their range."""
+    text = QUADRUPED.replace('axis="0 1 0" range="-60 60"', 'axis="0 1 0" range="10 40"')
+    creature, _ = bring(tmp_path, text, freeze=("*_hip",))
+    before, after = mujoco.MjModel.from_xml_string(text), creature.model
+    places = []
+    for model, trunk, hip in ((before, 1, np.radians(25)), (after, creature.trunk, 0.0)):
+        data = mujoco.MjData(model)
+        for leg in CORNERS if hip else ():
+            data.joint(f"{leg}_hip").qpos = hip
+        mujoco.mj_kinematics(model, data)
+        knees = [data.joint(f"{leg}_knee").xanchor - data.xpos[trunk] for leg in CORNERS]
+        places.append(np.array(knees) @ data.xmat[trunk].reshape(3, 3))
+    np.testing.assert_allclose(*places, atol=DIGITS)
 
 
 def test_a_urdf_biped_stands_without_its_meshes(tmp_path):
@@ -189,7 +209,7 @@ def test_degrees_in_a_urdf_are_read_as_degrees(tmp_path):
         tmp_path, BIPED.replace('lower="-1.2" upper="1.2"', 'lower="-69" upper="69"'), "urdf"
     )
     assert told(imported, "read as degrees")
-    np.testing.assert_allclose(creature.joints.high, np.radians(69), rtol=1e-6)
+    np.testing.assert_allclose(creature.joints.high, np.radians(69), rtol=DIGITS)
 
 
 def test_y_up_by_gravity_is_turned(tmp_path):

@@ -9,7 +9,7 @@ from mjxgait.certification import CertificateConfig
 from mjxgait.config.layers import over_base
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import build
-from mjxgait.importer.parts import Notes
+from mjxgait.importer.notes import Notes
 from mjxgait.importer.write_toml import manner
 
 STEP = 0.005

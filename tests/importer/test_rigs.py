@@ -20,7 +20,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, Imported, import_model
-from mjxgait.importer.parts import Notes
+from mjxgait.importer.notes import Notes
 from mjxgait.importer.rig import Hinge, Plan, hinges_of
 from mjxgait.importer.rigged import model_of
 
