@@ -63,13 +63,13 @@ class AdvanceRows(Job[Advanced]):
     @override
     def do(self, programs: Programs, recipe: Recipe) -> Advanced:
         batch = programs.batch(recipe)
-        way = _Generations(programs.step(recipe), batch, self._begun(batch), self.until)
+        done = _Generations(programs.step(recipe), batch, self._begun(batch), self.until)
         champions: dict[int, Champion] = {}
-        for _ in way:
+        for _ in done:
             for row, experiment in enumerate(batch.experiments):
-                if way.generation == experiment.config.evolution.generations:
-                    champions[row] = experiment.champion(_row(way.states, row), versions())
-        return way.advanced(pack(way.states), champions=champions)
+                if done.generation == experiment.config.evolution.generations:
+                    champions[row] = experiment.champion(_row(done.states, row), versions())
+        return done.advanced(pack(done.states), champions=champions)
 
     def _begun(self, batch: Batch) -> EvolutionState:
         if self.state is None and self.planted is None:
@@ -93,13 +93,13 @@ class AdvanceIsland(Job[Advanced]):
         begun = self.state and self.state.state(one.abstract(), "an island's state")
         state, reason = begun or one.init(self.island), None
         alone = jax.tree.map(lambda leaf: leaf[None], state)
-        way = _Generations(programs.step(recipe), batch, alone, self.until)
-        for lines in way:
-            state = jax.tree.map(lambda leaf: leaf[0], way.states)
+        done = _Generations(programs.step(recipe), batch, alone, self.until)
+        for lines in done:
+            state = jax.tree.map(lambda leaf: leaf[0], done.states)
             lines[0] |= followed(one.simulator.controller.numbers(state.genomes))
             if reason := stop_reason(state, one.config.evolution):
                 break
-        return way.advanced(pack(state), reason=reason)
+        return done.advanced(pack(state), reason=reason)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -110,7 +110,7 @@ class Programs:
     def __init__(self, turn: Turn = at_once) -> None:
         self._turn = turn
         self._batches: LruCache[tuple[BatchKey, Batch]] = LruCache(KEPT)
-        self._plans: LruCache[SimulatorSpec] = LruCache(KEPT)
+        self._specs: LruCache[SimulatorSpec] = LruCache(KEPT)
         self._stages: LruCache[CompiledGeneration] = LruCache(KEPT)
         self._evaluators: LruCache[jax.stages.Compiled] = LruCache(KEPT)
 
@@ -162,7 +162,7 @@ class Programs:
     def _built(self, recipe: Recipe) -> tuple[BatchKey, Batch]:
         creature, configs = recipe.read()
         shape = program_key(creature, configs[0])
-        plan = self._plans.find(shape, lambda: make_spec(creature, configs[0]))
-        batch = build_batch(creature, configs, plan, recipe.sources)
+        spec = self._specs.find(shape, lambda: make_spec(creature, configs[0]))
+        batch = build_batch(creature, configs, spec, recipe.sources)
         sources = max(map(len, recipe.sources), default=0)
         return BatchKey(shape, len(configs), sources), batch

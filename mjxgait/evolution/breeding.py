@@ -202,8 +202,8 @@ def first_of_kind(
     worth: tuple[object, object] = of_old, of_new
     if variation.price is not None:
         worth = (of_old, variation.price(old)), (of_new, variation.price(new))
-    evaluation = jnp.isfinite(together(of_old, of_new)).all((1, 2))
-    return jnp.where(state.forced, by_genome, _new_first(*worth) & evaluation & (itself | ~anew))
+    evaluated = jnp.isfinite(together(of_old, of_new)).all((1, 2))
+    return jnp.where(state.forced, by_genome, _new_first(*worth) & evaluated & (itself | ~anew))
 
 
 def together(old: Tree, new: Tree) -> Tree:

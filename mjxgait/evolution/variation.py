@@ -89,9 +89,9 @@ def real_variation(box: Box, config: EvolutionConfig) -> Variation:
 
 def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Tree) -> Tree:
     """Apply the function to a separate key and one array of each tree, leaf by leaf."""
-    leaves, program_key = jax.tree.flatten(trees[0])
+    leaves, structure = jax.tree.flatten(trees[0])
     columns = zip(jax.random.split(key, len(leaves)), *map(jax.tree.leaves, trees), strict=True)
-    return jax.tree.unflatten(program_key, [function(*column) for column in columns])
+    return jax.tree.unflatten(structure, [function(*column) for column in columns])
 
 
 def narrowed(box: Box, share: jax.Array | float) -> Box:
@@ -177,11 +177,11 @@ def first_occurrence(genomes: object) -> jax.Array:
 def _draw(
     key: jax.Array, box: Box, count: int, draw: Callable[[jax.Array, tuple[int, ...]], jax.Array]
 ) -> Any:
-    lows, program_key = jax.tree.flatten(box.low)
+    lows, structure = jax.tree.flatten(box.low)
     highs = jax.tree.leaves(box.high)
     keys = jax.random.split(key, len(lows))
     leaves = [
         low + (high - low) * draw(k, (count, *low.shape))
         for k, low, high in zip(keys, lows, highs, strict=True)
     ]
-    return jax.tree.unflatten(program_key, leaves)
+    return jax.tree.unflatten(structure, leaves)

@@ -114,6 +114,6 @@ class HaltingReference(PoseReference):
         halted = planned + share * (self.creature.joints.stand - planned)
         target = self.corrected(halted, senses, memory["steps"])
         steps = memory["steps"] + 1
-        next_goal = self.advance(memory["position"], target, senses["joint_pos"], steps)
-        position = np.where(since < 0, next_goal, memory["position"])
+        advanced = self.advance(memory["position"], target, senses["joint_pos"], steps)
+        position = np.where(since < 0, advanced, memory["position"])
         return target, {**memory, "position": position, "steps": steps}

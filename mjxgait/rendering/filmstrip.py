@@ -85,7 +85,7 @@ def moments(walk: Walk) -> np.ndarray:
 def strobe(walk: Walk) -> Image.Image:
     """Draw all moments from the side; the way sets the picture's width."""
     stage, frames = Stage([walk], 2 * HEIGHT, HEIGHT), moments(walk)
-    (participant,) = stage.entrants
+    (participant,) = stage.participants
     shown = [(participant.painter, *participant.poses(frame * walk.time_step)) for frame in frames]
     return paint(_camera(stage, walk, frames), shown, stage.origin, stage.relief)
 
@@ -111,7 +111,7 @@ def _camera(stage: Stage, walk: Walk, frames: np.ndarray) -> Camera:
     moved = walk.trunk_pos[frames] - walk.trunk_pos[0]
     way = moved[:, :2] @ walk.forward
     length = float(np.ptp(way)) + 2.4 * walk.creature.frame.body_length
-    high = stage.entrants[0].top + max(float(moved[:, 2].max()), 0.0)
+    high = stage.participants[0].top + max(float(moved[:, 2].max()), 0.0)
     side = dataclasses.replace(stage.camera(0), azimuth=0.0, elevation=ELEVATION)
     scale = min(HEIGHT / (ROOM * high), WIDEST / length)
     middle = stage.origin + (way.min() + way.max()) / 2 * stage.forward

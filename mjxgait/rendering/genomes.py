@@ -165,11 +165,11 @@ def bodies_of(run: Path, champion: Champion) -> Row:
     """Return the champion and its maternal ancestors in some of the stored generations; the best
     individuals if the log has no mothers.
     """
-    lru = read_snapshot(run)
-    line = mothers_line(lru.lines, lru.generation, _place(lru, champion))
+    latest = read_snapshot(run)
+    line = mothers_line(latest.lines, latest.generation, _place(latest, champion))
     descend = len(line) > 1
-    places = line if descend else dict.fromkeys(lru.generations, 0)
-    known = [generation for generation in lru.generations if generation in places]
+    places = line if descend else dict.fromkeys(latest.generations, 0)
+    known = [generation for generation in latest.generations if generation in places]
     chosen = np.linspace(0, len(known) - 1, min(len(known), MOST)).round().astype(int)
     shown = {known[i]: places[known[i]] for i in np.unique(chosen)}
     return Row(in_generations(run, shown, STANDING), descend)

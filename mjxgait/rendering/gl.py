@@ -97,14 +97,16 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
     """Write the worker's input: poses [F, N, nq] with each creature in its lane, and the camera of
     every frame.
     """
-    walk = stage.entrants[0].walk
+    walk = stage.participants[0].walk
     spec, creature = walk.marked, walk.creature
     cameras = [stage.camera(frame) for frame in frames]
     first = cameras[0]
     into = first.axes[2]
     place = creature.root_qpos
     times = [frame * stage.time_step for frame in frames]
-    poses = np.array([[one.walk.qpos[one.frame(time)] for one in stage.entrants] for time in times])
+    poses = np.array(
+        [[one.walk.qpos[one.frame(time)] for one in stage.participants] for time in times]
+    )
     poses[..., place : place + 3] += stage.lanes
     numbers = {
         int(n) for camera in (first, cameras[-1]) for n in band_lines(camera, stage.origin)[0]
@@ -142,7 +144,7 @@ def _ground(stage: Stage) -> dict[str, Any]:
     if stage.relief is None:
         return {}
     room = 2.5 * stage.width / stage.camera(0).scale
-    hip_height = stage.entrants[0].walk.creature.frame.hip_height
+    hip_height = stage.participants[0].walk.creature.frame.hip_height
     cell, lanes = GROUND_CELL * hip_height, stage.lanes @ stage.left
     ahead = np.arange(stage.way[:, 0].min() - room, stage.way[:, 0].max() + room, cell)
     aside = stage.way[:, 1]

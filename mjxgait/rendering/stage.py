@@ -99,7 +99,7 @@ class Stage:
         self.width, self.height, self.time_step = width, height, walks[0].time_step
         self.origin, self.forward = walks[0].trunk_pos[0, :2], walks[0].forward
         self.left = np.array([-self.forward[1], self.forward[0], 0.0])
-        self.entrants = [Participant(walk, self.origin, self.forward) for walk in walks]
+        self.participants = [Participant(walk, self.origin, self.forward) for walk in walks]
         self.frames = max(round(walk.seconds / self.time_step) for walk in walks)
         usual = {} if len(walks) == 1 else {"elevation": float(RACE_ELEVATION)}
         self.view = usual if view is None else view_of(view)
@@ -109,13 +109,13 @@ class Stage:
     @property
     def alike(self) -> bool:
         """True if all walks have the same creature, goals and bar."""
-        first = self.entrants[0].walk
-        return all(_same_scene(first, participant.walk) for participant in self.entrants[1:])
+        first = self.participants[0].walk
+        return all(_same_scene(first, participant.walk) for participant in self.participants[1:])
 
     def picture(self, frame: int) -> Image.Image:
         """Draw a frame; a finished walk stays in its last pose."""
         shown = []
-        for participant, lane in zip(self.entrants, self.lanes, strict=True):
+        for participant, lane in zip(self.participants, self.lanes, strict=True):
             pos, rot = participant.poses(frame * self.time_step)
             shown.append((participant.painter, pos + lane, rot))
         return paint(self.camera(frame), shown, self.origin, self.relief)
@@ -136,7 +136,7 @@ class Stage:
 
     def behind(self, frame: int, place: int) -> np.ndarray:
         """Return the pixel [2] right behind a lane's creature, at half its standing height."""
-        participant = self.entrants[place]
+        participant = self.participants[place]
         trunk = participant.trunk(frame * self.time_step) + self.lanes[place]
         point = trunk[:2] + participant.back * self.forward
         level = float(self.relief(*point)) if self.relief else 0.0
@@ -146,7 +146,7 @@ class Stage:
     @property
     def relief(self) -> Relief | None:
         """Heights of uneven ground, each lane with its own walk's; None for the plane."""
-        if all(participant.walk.ground is None for participant in self.entrants):
+        if all(participant.walk.ground is None for participant in self.participants):
             return None
         return self._height
 
@@ -156,21 +156,25 @@ class Stage:
         aside = (places - self.origin) @ self.left[:2]
         nearest = np.abs(aside[:, None] - self.lanes @ self.left).argmin(-1)
         heights = np.zeros(len(places))
-        for lane, participant in enumerate(self.entrants):
+        for lane, participant in enumerate(self.participants):
             mine = nearest == lane
             heights[mine] = participant.ground_heights(places[mine] - self.lanes[lane, :2])
         return heights.reshape(np.shape(x))
 
     def _lanes(self) -> np.ndarray:
         """Offsets of the lanes [lanes, 3] m from their common middle."""
-        widths = np.array([max(LANE * one.across, LONG_LANE * one.along) for one in self.entrants])
+        widths = np.array(
+            [max(LANE * one.across, LONG_LANE * one.along) for one in self.participants]
+        )
         places = np.cumsum(widths) - widths / 2
         return (places - places[[0, -1]].mean())[:, None] * self.left
 
     def _choose_view(self) -> None:
         """Set scale, height and path of the camera such that all lanes fill the picture."""
         flat = Camera(np.append(self.origin, 0.0), self.forward, 1.0, 0, 0, **self.view)
-        outlines = [one.outline + lane for one, lane in zip(self.entrants, self.lanes, strict=True)]
+        outlines = [
+            one.outline + lane for one, lane in zip(self.participants, self.lanes, strict=True)
+        ]
         seen = flat.pixels(np.concatenate(outlines))
         size = np.ptp(seen, axis=0)
         self.scale = float(min(self.width / (ROOM * size[0]), self.height / (ROOM * size[1])))
@@ -180,7 +184,7 @@ class Stage:
             float(-seen[:, 1].min() - 0.5 * size[1]) / np.cos(flat.elevation)
             - 0.03 * self.height / self.scale
         )
-        everyone = np.array([self._path(participant) for participant in self.entrants])
+        everyone = np.array([self._path(participant) for participant in self.participants])
         # A race needs room behind the leader.
         behind = 0.0 if len(everyone) == 1 else LAG * self.width / self.scale
         front = np.column_stack(

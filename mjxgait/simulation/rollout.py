@@ -59,7 +59,7 @@ class Late:
 class Lane:
     """One simulation in flight.
 
-    job: [] place in the device's queue. plan, memory: the controller's. stats, aim, standards: the
+    job: [] place in the device's queue. plan, memory: the controller's. stats, goal, params: the
     task's. rules: the drive's. push as in `Starts`.
     command: [J] the controller's latest; None where the controller acts in every step.
     late: None where torques are never delayed.
@@ -290,13 +290,13 @@ class Simulator:
     def _command(self, k: jax.Array, lane: Lane, sensed: Sensed) -> tuple[jax.Array, object]:
         """Return the commands of a step, and the controllers' memories."""
 
-        def requested() -> tuple[jax.Array, object]:
+        def acted() -> tuple[jax.Array, object]:
             return self._per_lane(self._act)(lane, sensed)
 
         if not self._holds:
-            return requested()
+            return acted()
         due = k % self.controller.every == 0
-        return jax.lax.cond(due, requested, lambda: (lane.command, lane.memory))
+        return jax.lax.cond(due, acted, lambda: (lane.command, lane.memory))
 
     def _act(self, lane: Lane, sensed: Sensed) -> tuple[jax.Array, object]:
         """Return the controller's command [J] and its memory."""

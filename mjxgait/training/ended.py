@@ -49,7 +49,7 @@ def nothing_left(run: Path, creature: Creature, config: Config, kept: Config) ->
     reason = end_of(run, creature, config, stored)
     if reason is None or not _examined(run, creature, config):
         return None
-    return f"{run}: nothing is left to do: {reason}. {_next_goal(run, config, stored)}"
+    return f"{run}: nothing is left to do: {reason}. {_to_continue(run, config, stored)}"
 
 
 def _stopped(config: Config, stored: Stored) -> str | None:
@@ -89,7 +89,7 @@ def _examined(run: Path, creature: Creature, config: Config) -> bool:
     return outdated(document, champion, creature) is None
 
 
-def _next_goal(run: Path, config: Config, stored: Stored) -> str:
+def _to_continue(run: Path, config: Config, stored: Stored) -> str:
     """Return the command that continues a finished run, or advice if no option does."""
     generation, evolution = stored.manifest.generation, config.evolution
     endless = dataclasses.replace(evolution, target=None, generations=generation + 1)

@@ -94,8 +94,8 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
     evaluation of the rows.
     """
     count, own = sources.shape[1], jnp.arange(len(sources))[:, None]
-    evaluation = states.generation[:, None] >= 0
-    comes, rank = (sources != own) & evaluation, states.generation[:, None] % SENT
+    evaluated = states.generation[:, None] >= 0
+    comes, rank = (sources != own) & evaluated, states.generation[:, None] % SENT
 
     def seated(children: jax.Array, best: jax.Array) -> jax.Array:
         guests, last = best[sources, rank % best.shape[1]], children[:, -count:]

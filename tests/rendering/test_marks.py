@@ -53,7 +53,7 @@ def test_overlays_do_not_change_the_drawing_of_the_creature(limbo: Walk, stool_w
     """Scale and view depend on the creature alone, and its geoms come first."""
     with_bar, without = Stage([limbo], 320, 180), Stage([stool_walk], 320, 180)
     assert with_bar.scale == without.scale
-    (barred,), (plain,) = with_bar.entrants, without.entrants
+    (barred,), (plain,) = with_bar.participants, without.participants
     count = len(plain.painter.far)
     np.testing.assert_array_equal(barred.painter.far[:count], plain.painter.far)
     for mine, plain in zip(

@@ -53,7 +53,7 @@ def test_clocks_of_different_creatures_agree(stool_walk):
         trajectory=dataclasses.replace(stool_walk.trajectory, time_step=2 * stool_walk.time_step),
     )
     stage = Stage([stool_walk, slow], 320, 180)
-    first, second = stage.entrants
+    first, second = stage.participants
     assert second.frame(1.0) == pytest.approx(first.frame(1.0) / 2, abs=1)
     assert stage.frames == pytest.approx(2 * len(stool_walk.qpos), abs=1)
     assert first.frame(100.0) == len(stool_walk.qpos) - 1
@@ -66,14 +66,14 @@ def test_lanes_are_as_wide_as_their_creatures(stool_walk, crab_walk):
     assert (gaps > halves).all()
     assert gaps[0] == pytest.approx(gaps[1])
     # No creature is outside the picture.
-    for place, participant in enumerate(stage.entrants):
+    for place, participant in enumerate(stage.participants):
         pixels = stage.camera(0).pixels(participant.outline + stage.lanes[place])
         assert (pixels > 0).all()
         assert (pixels < [320, 180]).all()
 
 
 def pairs(stage: Stage):
-    return stage.entrants[:-1], stage.entrants[1:]
+    return stage.participants[:-1], stage.participants[1:]
 
 
 def test_every_participant_is_painted(stool_walk, crab_walk):
@@ -82,7 +82,7 @@ def test_every_participant_is_painted(stool_walk, crab_walk):
     whole = np.asarray(both.picture(10), int)
     for keep in (0, 1):
         one = Stage([stool_walk, crab_walk], 160, 96)
-        one.entrants, one.lanes = [one.entrants[keep]], one.lanes[[keep]]
+        one.participants, one.lanes = [one.participants[keep]], one.lanes[[keep]]
         assert np.abs(np.asarray(one.picture(10), int) - whole).max() > 50
 
 

@@ -120,7 +120,7 @@ def test_the_camera_does_not_shake():
 @pytest.mark.parametrize("view", VIEWS)
 def test_every_view_has_the_whole_creature_in_the_picture(stool_walk, view: str):
     stage = Stage([stool_walk], 320, 180, view)
-    pixels = stage.camera(0).pixels(stage.entrants[0].outline)
+    pixels = stage.camera(0).pixels(stage.participants[0].outline)
     assert (pixels > 0).all()
     assert (pixels < [320, 180]).all()
     # It fills at least half of the width or height.

@@ -161,9 +161,9 @@ def test_generations_have_different_starts_until_the_cycle_repeats(stool: Creatu
     state = experiment.init()
 
     def told(generation: int) -> list[float]:
-        lru = dataclasses.replace(state, generation=generation - 1)
+        latest = dataclasses.replace(state, generation=generation - 1)
         return np.asarray(
-            next_starts(experiment.simulator.task, experiment.row, lru).friction
+            next_starts(experiment.simulator.task, experiment.row, latest).friction
         ).tolist()
 
     rounds = [told(generation) for generation in range(5)]

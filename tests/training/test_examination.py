@@ -498,18 +498,18 @@ def test_at_most_one_generation_evolves_during_certification(
     tmp_path: Path, experiment: Experiment, promising: None, monkeypatch: pytest.MonkeyPatch
 ):
     """Certification takes all cores; only the generation that has begun is finished."""
-    folder, lru, soon = tmp_path / "run", [], examination.certify
+    folder, latest, soon = tmp_path / "run", [], examination.certify
 
     def slow(*arguments: object, **settings: object) -> Certificate:
         for _ in range(2):
-            lru.append(read_metrics(folder / "metrics.jsonl")[-1]["generation"])
+            latest.append(read_metrics(folder / "metrics.jsonl")[-1]["generation"])
             time.sleep(0.5)
         return soon(*arguments, **settings)
 
     monkeypatch.setattr(examination, "certify", slow)
     create_run(folder, experiment.creature, experiment.config)
     assert "in generation 3" in trained(folder, experiment)
-    assert lru[1] - lru[0] <= 1
+    assert latest[1] - latest[0] <= 1
 
 
 def test_an_error_in_validation_ends_the_run(

@@ -145,8 +145,8 @@ def _table(plan: Plan, results: Sequence[Result], findings: Sequence[Finding]) -
             ]
         else:
             cells += ["-"] * 4
-        evaluation = [r.certified for r in mine if r.certified is not None]
-        certified = _estimate(share(sum(evaluation), len(evaluation))) if evaluation else "-"
+        examined = [r.certified for r in mine if r.certified is not None]
+        certified = _estimate(share(sum(examined), len(examined))) if examined else "-"
         cells += [
             f"{np.mean([r.up for r in mine]):.0%}",
             certified,

@@ -221,7 +221,7 @@ The starts are perturbed as in the certificate, and unseen in evolution.
 
 Ways = dict[str, tuple[float, float]]
 """A champion's `walk` and `up` on each ground."""
-Evaluation = tuple[Ways, bool | None]
+Measured = tuple[Ways, bool | None]
 """A champion's `Ways` and the `certified` of its `Result`."""
 
 
@@ -295,8 +295,8 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
             [champion_path(folder, plan, run) for run in missing],
             [_has_finite_best(lines[run.variant, run.seed]) for run in missing],
         )
-        for number, (run, evaluation) in enumerate(zip(missing, found, strict=True), 1):
-            result = _result(plan.study, run, lines[run.variant, run.seed], evaluation)
+        for number, (run, walked_as) in enumerate(zip(missing, found, strict=True), 1):
+            result = _result(plan.study, run, lines[run.variant, run.seed], walked_as)
             known[result.variant, result.seed] = result
             append_lines(folder / MEASURED, [dataclasses.asdict(result)])
             tell(number, len(missing))
@@ -307,8 +307,8 @@ def _measured(folder: Path) -> list[Line]:
     return read_records(folder / MEASURED, Result)
 
 
-def _result(study: Study, run: Run, lines: Sequence[Line], evaluation: Evaluation) -> Result:
-    ways, certified = evaluation
+def _result(study: Study, run: Run, lines: Sequence[Line], measured: Measured) -> Result:
+    ways, certified = measured
     walk, up = ways[study.grounds[0]]
     best = [-math.inf if line["best"] is None else line["best"] for line in lines]
     finite, threshold = _has_finite_best(lines), study.threshold
@@ -335,7 +335,7 @@ def _has_finite_best(lines: Sequence[Line]) -> bool:
 
 def _evaluate(
     creature_folder: Path, grounds: Sequence[str], examine: bool, path: Path, finite: bool
-) -> Evaluation:
+) -> Measured:
     """Evaluate the champion at `path` on each ground; if `examine`, also certify it on the first.
 
     Runs in its own process. The arguments are small: the pool of Python 3.11 hangs if a process is

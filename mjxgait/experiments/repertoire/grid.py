@@ -133,9 +133,7 @@ def check(config: Config) -> None:
         )
     if config.evolution.body != 1:
         raise UserError("evolution.body: the clips of a repertoire are of one body; leave it at 1")
-    if config.fitness.wish.requested and {"speed", "turn", "steer"} & set(
-        config.fitness.wish.requested
-    ):
+    if {"speed", "turn", "steer"} & set(config.fitness.wish.requested):
         raise UserError("fitness.wish: the grid asks for speeds and turns; leave these out")
 
 

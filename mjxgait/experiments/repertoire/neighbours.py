@@ -102,8 +102,8 @@ def _blended(folder: Path, pair: Pair) -> Blend:
     """Test a pair in its own process, which receives only the walks' place."""
     (creature, one), (_, other) = (open_champion(folder / cell.name) for cell in pair)
     seen = nominal_check(creature, half_way(one, other, creature))
-    evaluation = [criterion for criterion in seen.criteria if criterion.number in WALKS]
-    return Blend(pair, tuple(criterion.name for criterion in evaluation if not criterion.passed))
+    criteria = [criterion for criterion in seen.criteria if criterion.number in WALKS]
+    return Blend(pair, tuple(criterion.name for criterion in criteria if not criterion.passed))
 
 
 def half_way(one: Champion, other: Champion, creature: Creature) -> Champion:

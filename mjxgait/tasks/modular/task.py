@@ -48,7 +48,7 @@ def own(sensed: Sensed) -> ModularSensed:
 
 @pytree
 class EpisodeStats(protocol.EpisodeStats):
-    """Extension of `protocol.EpisodeStats`.
+    """Extension of `base.EpisodeStats`.
 
     settled, place: [3] m, centre of mass when counting began, and now.
     light: [3] m, its place. since: [] step from which the way counts. None without a light.
@@ -168,7 +168,7 @@ LITTLE = 1e-6
 
 @pytree
 class SwimStats(EpisodeStats):
-    """Extension of `alive.EpisodeStats`.
+    """Extension of `EpisodeStats`.
 
     began: [3] kg·m/s, momentum of the body when counting began.
     given: [3] kg·m/s, from the water since then. exchanged: [] the same without directions.
@@ -228,7 +228,7 @@ class Swim(GoingTask):
 
 @pytree
 class RoamStats(EpisodeStats):
-    """Extension of `alive.EpisodeStats`.
+    """Extension of `EpisodeStats`.
 
     upwards: [3] direction in the root's axes that was up when counting began.
     upright: [] least cosine of its angle with the world's up axis since then.
@@ -294,7 +294,7 @@ in the trial that it was selected by.
 
 @pytree
 class JumpStats(protocol.EpisodeStats):
-    """Extension of `protocol.EpisodeStats`.
+    """Extension of `base.EpisodeStats`.
 
     heights: [SPANS] m, greatest height of the lowest part in each.
     """

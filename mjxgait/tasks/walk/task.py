@@ -199,7 +199,7 @@ class TargetedWalk(Walk):
 
     @override
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
-        with_targets = target_weights(settings.wish)
+        weights = target_weights(settings.wish)
         return super().weights(settings, generation) | {
-            n: -jnp.float32(w) for n, w in with_targets.items()
+            n: -jnp.float32(w) for n, w in weights.items()
         }

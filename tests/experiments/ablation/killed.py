@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mjxgait.experiments.ablation import rows
-from mjxgait.experiments.ablation.rows import Evaluation
+from mjxgait.experiments.ablation.rows import Measured
 
 LAST = "2-0.json"
 """The champion at which the process is killed."""
@@ -19,7 +19,7 @@ JUDGE = rows._evaluate
 
 def evaluate(
     creature: Path, grounds: Sequence[str], examine: bool, champion: Path, finite: bool
-) -> Evaluation:
+) -> Measured:
     """Stand-in for `rows._evaluate`: killed once, after another champion's result is on disk."""
     rows.SECONDS, study = 1.0, creature.parent
     killed = study.with_name(f"{study.name}-was-killed")
