@@ -158,6 +158,7 @@ def check_sound(faults: list[Fault], root: Path, cache: Path) -> None:
         sys.exit(f"the tests fail without a fault, with status {status}:\n{output[-3000:]}")
 
 
+FOLDER = re.compile(re.escape(tempfile.gettempdir()) + r"/(?:[^/\s]+/)*")
 HEAD = "| fault | where | what goes wrong | caught by | assertion |\n|---|---|---|---|---|"
 
 
@@ -170,7 +171,9 @@ def table(findings: list[Finding], text: str = "", order: Sequence[str] = ()) ->
     rows = {line[2:].partition(" | ")[0]: line for line in text.splitlines() if ROW.match(line)}
     for finding in findings:
         fault, caught = finding.fault, f"`{finding.caught_by}`" if finding.caught_by else "nothing"
-        reason = f"`{finding.reason[:LONGEST_REASON]}`" if finding.reason else ""
+        # Temporary folders differ from machine to machine.
+        reason = FOLDER.sub("…/", finding.reason)[:LONGEST_REASON]
+        reason = f"`{reason}`" if reason else ""
         cells = (fault.name, f"`{fault.file.removeprefix('mjxgait/')}`", fault.why, caught, reason)
         rows[fault.name] = f"| {' | '.join(cell.replace('|', ' ') for cell in cells)} |"
     names = [name for name in order if name in rows] or list(rows)

@@ -3,6 +3,7 @@
 import ast
 import importlib.util
 import sys
+import tempfile
 from pathlib import Path
 from types import ModuleType
 
@@ -123,11 +124,15 @@ def test_a_test_that_fails_anyway_has_caught_nothing(tmp_path: Path, capsys: pyt
 
 
 def test_a_page_keeps_its_other_rows(tmp_path: Path):
-    found = script.Finding(script.Fault("b", "mjxgait/x.py", "", "", (), "w"), "t::u", 1.0, "E | 1")
+    reason = f"E | 1 in {Path(tempfile.gettempdir()) / 'one' / 'two' / 'x.xml'}"
+    found = script.Finding(script.Fault("b", "mjxgait/x.py", "", "", (), "w"), "t::u", 1.0, reason)
     page = f"# Title\n\n{script.HEAD}\n| c | `y.py` | v | `t` | |\n| b | `x.py` | old | `t` | |\n"
     lines = script.table([found], page, ["b", "c"]).splitlines()
     assert lines[0] == "# Title"
-    assert lines[-2:] == ["| b | `x.py` | w | `t::u` | `E   1` |", "| c | `y.py` | v | `t` | |"]
+    assert lines[-2:] == [
+        "| b | `x.py` | w | `t::u` | `E   1 in …/x.xml` |",
+        "| c | `y.py` | v | `t` | |",
+    ]
 
 
 def test_a_fault_without_its_old_text_is_refused(tmp_path: Path):

@@ -230,8 +230,8 @@ def test_sinking_depth_is_relative_to_block_size(bodies: Body):
 def test_light_direction_is_in_each_blocks_own_axes(graphs: Graph, bodies: Body):
     state, place = moments(bodies, 0.3), np.array([3.0, -4.0, 1.0])
     sensed, _ = looked_at(state)
-    nobody: Any = None
-    look = jax.vmap(partial(Following.observations, nobody, jnp.float32(place)), in_axes=-1)
+    unused: Any = None
+    look = jax.vmap(partial(Following.observations, unused, jnp.float32(place)), in_axes=-1)
     seen = np.asarray(jax.jit(look)(sensed)["light"])
     for lane in range(LANES):
         body = one(bodies, lane)

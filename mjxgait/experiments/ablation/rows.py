@@ -295,8 +295,8 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
             [champion_path(folder, plan, run) for run in missing],
             [_has_finite_best(lines[run.variant, run.seed]) for run in missing],
         )
-        for number, (run, walked_as) in enumerate(zip(missing, found, strict=True), 1):
-            result = _result(plan.study, run, lines[run.variant, run.seed], walked_as)
+        for number, (run, outcome) in enumerate(zip(missing, found, strict=True), 1):
+            result = _result(plan.study, run, lines[run.variant, run.seed], outcome)
             known[result.variant, result.seed] = result
             append_lines(folder / MEASURED, [dataclasses.asdict(result)])
             tell(number, len(missing))
