@@ -146,8 +146,15 @@ def load(kind: str, text: str) -> str:
 
 
 def loaded() -> tuple[tuple[str, str], ...]:
-    """Return kind and `FILE.py:CLASS` of all loaded classes, for other processes to load."""
-    return tuple((kind, text) for (kind, _), text in _LOADED.items())
+    """Return kind and `FILE.py:CLASS` of all loaded classes, for other processes to load.
+
+    Classes whose file is gone are left out: a run that needs one says so, others go on.
+    """
+    return tuple(
+        (kind, text)
+        for (kind, _), text in _LOADED.items()
+        if Path(text.rpartition(":")[0]).is_file()
+    )
 
 
 def places_of(use: UseConfig) -> dict[str, str]:

@@ -11,6 +11,7 @@ from mjxgait.distributed.connect import Machine, mismatch, require_same, this
 from mjxgait.distributed.recipe import Recipe, UserCode
 from mjxgait.errors import UserError
 from mjxgait.plugins.registry import find
+from mjxgait.plugins.user_code import load, loaded
 
 OWN = """
 from mjxgait.tasks.plain import PlainTask
@@ -43,6 +44,15 @@ def test_user_code_is_sent_as_text(stool: Creature, tmp_path: Path):
     part = UserCode("task", "Idle", "idle_travels.py", OWN)
     Recipe(dict(stool.files), (), (part,)).read()
     assert find("task", "idle_travels.py:Idle").__name__ == "Idle"
+
+
+def test_another_process_does_not_load_a_file_that_is_gone(tmp_path: Path):
+    path = tmp_path / "idle_vanishes.py"
+    path.write_text(OWN)
+    load("task", f"{path}:Idle")
+    assert ("task", f"{path}:Idle") in loaded()
+    path.unlink()
+    assert all("idle_vanishes.py" not in text for _, text in loaded())
 
 
 def test_machines_with_the_same_versions_can_work_together():
