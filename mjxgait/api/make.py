@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from mjxgait.creature.scale import at_step, facing, load_files, scaled
 from mjxgait.errors import UserError
 from mjxgait.training.examination import Exams
 from mjxgait.training.folder import CERTIFICATE, EXAMS, check_run, command, create_run
+
+if TYPE_CHECKING:
+    from mjxgait.training.screen import Screen
 
 
 def load_creature(
@@ -179,7 +183,6 @@ def _evolved(
     """Evolve and examine a run in a new folder; return it. begin: makes the folder."""
     from rich.console import Console
 
-    from mjxgait.distributed.evolve import evolve
     from mjxgait.training.screen import Screen
     from mjxgait.training.stages import prepare_devices
 
@@ -187,6 +190,29 @@ def _evolved(
     screen = Screen(Console(quiet=True)) if quiet else Screen()
     evolve(folder, creature, config, screen, begin=begin)
     return Run(folder)
+
+
+def evolve(
+    folder: Path,
+    creature: Creature,
+    config: Config,
+    screen: "Screen",
+    resume: bool = False,
+    generation: int | None = None,
+    cluster: str | None = None,
+    begin: Callable[[], object] = lambda: None,
+) -> bool:
+    """Evolve a run, here or on a cluster; return whether it came to its end.
+
+    For the arguments and errors see `training.loop.train` and `distributed.evolve.evolve`.
+    """
+    if cluster or config.evolution.islands.count > 1:
+        from mjxgait.distributed.evolve import evolve as across
+
+        return across(folder, creature, config, screen, resume, generation, cluster, begin)
+    from mjxgait.training import loop
+
+    return loop.train(folder, creature, config, screen, resume, generation, begin=begin)
 
 
 def _use(**named: str | None) -> dict[str, str]:

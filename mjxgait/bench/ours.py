@@ -20,9 +20,10 @@ from mjxgait.controllers.key_poses.controller import TUNING, Genome
 from mjxgait.creature import load_creature
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.training import loop
+from mjxgait.training.advance import Generations
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.examination import Examiner, Exams
-from mjxgait.training.experiment import Experiment, build_experiment
+from mjxgait.training.experiment import Batch, Experiment, build_experiment, one_row, row_of
 from mjxgait.training.folder import EXAMS
 from mjxgait.training.generation import evolution_of, next_starts
 from mjxgait.training.screen import Screen
@@ -182,9 +183,9 @@ def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
     """Return seconds per generation of a run's own loop: in all, compiled part, checkpoints."""
     inside: list[float] = []
 
-    def step(state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+    def step(states: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
         began = time.perf_counter()
-        result = jax.block_until_ready(ours.step(state))
+        result = jax.block_until_ready(one_row(ours.step(row_of(states))))
         inside.append(time.perf_counter() - began)
         return result
 
@@ -202,8 +203,7 @@ def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
         loop._evolve(
             Path(folder),
             Examiner(experiment, {}, screen.say, Exams(Path(folder) / EXAMS)),
-            step,
-            ours.first,
+            Generations(step, Batch((experiment,)), one_row(ours.first)),
             checkpoints,
             screen,
             threading.Event(),

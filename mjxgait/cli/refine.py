@@ -10,6 +10,7 @@ import numpy as np
 import tyro
 
 from mjxgait.api import Run, load_creature
+from mjxgait.api.make import evolve
 from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import read_toml
 from mjxgait.creature import Creature
@@ -152,7 +153,6 @@ def _run(
 
     write: makes the folder of a new run.
     """
-    from mjxgait.distributed.evolve import evolve
     from mjxgait.training.screen import Screen
     from mjxgait.training.stages import prepare_devices
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from mjxgait.api import Run, load_creature
+from mjxgait.api.make import evolve
 from mjxgait.cli.zoo import evolve_zoo
 from mjxgait.config.schema import Config, ExaminationConfig, Physics
 from mjxgait.config.tables import build, merge
@@ -171,7 +172,6 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
     """Evolve a new or resumed run and draw it; return the exit code."""
     # JAX takes a second to import, so the options are checked first.
     from mjxgait.cli.view import following
-    from mjxgait.distributed.evolve import evolve
     from mjxgait.training.screen import Screen
     from mjxgait.training.stages import prepare_devices
 

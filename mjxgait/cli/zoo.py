@@ -43,8 +43,9 @@ def evolve_zoo(
             folders = seeds.folders(zoo)
             creature, config = open_run(folders[0])
             again = command("train", "--resume", zoo, run=folders[0])
-            rows = Rows(creature, folders, keep_every=config.keep_every, together=seeds.together)
-            ended = rows.to_the_end(None, scheduler, screen.evolved, told) is not None
+            kept, together = config.keep_every, seeds.together
+            rows = Rows(creature, folders, screen.evolved, keep_every=kept, together=together)
+            ended = rows.to_the_end(scheduler, told) is not None
             ended = ended and examine(zoo, folders, again, screen.examined, told)
     if not ended:
         console.print(f"interrupted; go on with: {again}")

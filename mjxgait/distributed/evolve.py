@@ -1,4 +1,4 @@
-"""Run of one population or of several, on this machine or on a cluster."""
+"""Run of several populations, or of one on a cluster."""
 
 import contextlib
 import time
@@ -21,7 +21,6 @@ from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.errors import UserError
 from mjxgait.training import loop
 from mjxgait.training.screen import Screen
-from mjxgait.training.stored import locked
 
 A_SECOND = 4
 """Table updates per second; with thousands of workers one takes as long as handing out work."""
@@ -97,12 +96,11 @@ def evolve(
     cluster: str | None = None,
     begin: Callable[[], object] = lambda: None,
 ) -> bool:
-    """Start or resume the evolution in a run folder; return whether it reached its end.
+    """Start or resume islands, or a run on a cluster; return whether it reached its end.
 
     Args:
-      resume: continue from a checkpoint, the latest or that of `generation`.
+      resume, generation, begin: see `loop.train`.
       cluster: address of the cluster that computes it, if not this machine.
-      begin: makes the folder of a new run; called after the last check that can refuse the run.
 
     Raises:
       UserError: see `connected`; a single checkpoint was named, and there are islands; or another
@@ -111,19 +109,8 @@ def evolve(
     several = config.evolution.islands.count > 1
     if several and generation is not None:
         raise UserError(f"{folder}: islands go on from their latest checkpoints, not --generation")
-    with contextlib.ExitStack() as held:
-        if resume:
-            held.enter_context(locked(folder))
-
-        def begin_new() -> None:
-            begin()
-            if not resume:
-                held.enter_context(locked(folder))
-
-        scheduler = held.enter_context(scheduler_at(cluster, screen.console))
+    with scheduler_at(cluster, screen.console) as scheduler:
         if several:
-            return islands.train(folder, creature, config, screen, scheduler, resume, begin_new)
-        evaluator = ChunkedEvaluator(scheduler, creature, config) if cluster else None
-        return loop.train(
-            folder, creature, config, screen, resume, generation, evaluator, begin_new
-        )
+            return islands.train(folder, creature, config, screen, scheduler, resume, begin)
+        evaluator = ChunkedEvaluator(scheduler, creature, config)
+        return loop.train(folder, creature, config, screen, resume, generation, evaluator, begin)

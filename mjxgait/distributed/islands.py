@@ -16,10 +16,12 @@ from mjxgait.champion import write_champion
 from mjxgait.config.evolution import IslandsConfig
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
+from mjxgait.distributed.drive import drive
 from mjxgait.distributed.jobs import Advanced, AdvanceIsland, Lines
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.evolution.state import EvolutionState, stop_reason
+from mjxgait.training.advance import versions
 from mjxgait.training.checkpoint import Checkpoints, Packed
 from mjxgait.training.examination import Examined, Examiner, Exams, why_ended
 from mjxgait.training.experiment import Experiment, build_experiment
@@ -34,10 +36,10 @@ from mjxgait.training.folder import (
     append_lines,
     truncate_metrics,
 )
-from mjxgait.training.loop import conclude, interruptible, report, versions
+from mjxgait.training.loop import conclude, interruptible, report
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
-from mjxgait.training.stored import disk_errors
+from mjxgait.training.stored import disk_errors, locked_run
 
 OF_EACH = ("terms", "outcome", "fitness", "born", "origin", "rounds")
 """Arrays [P, ...] of a state, besides those of the genomes."""
@@ -154,58 +156,45 @@ def train(
     begin: makes the folder of new islands; called after the last check.
     """
     experiment = build_experiment(creature, config)
-    begin()
+    with locked_run(folder, resume, begin):
+        return _train(folder, experiment, screen, scheduler, resume)
+
+
+def _train(
+    folder: Path, experiment: Experiment, screen: Screen, scheduler: Scheduler, resume: bool
+) -> bool:
     if experiment.plant_note:
         screen.say(experiment.plant_note)
-    islands = _Islands(folder, creature, config, resume)
-    examiner = Examiner(
-        experiment, versions(), screen.say, Exams(folder / EXAMS), prescreen_of(experiment)
-    )
-    began, reason, examined = time.perf_counter(), None, None
-    screen.say(
-        f"{config.evolution.islands.count} islands, from generation {islands.generation + 1}"
-    )
+    exams, prescreen = Exams(folder / EXAMS), prescreen_of(experiment)
+    examiner = Examiner(experiment, versions(), screen.say, exams, prescreen)
+    islands, began = _Islands(folder, examiner, screen, resume), time.perf_counter()
+    screen.say(f"{islands.settings.count} islands, from generation {islands.generation + 1}")
     try:
         with interruptible() as interrupted:
-            while reason is None:
-                start = time.perf_counter()
-                found = islands.advance(scheduler, interrupted.is_set)
-                if not found:
-                    break
-                for line in islands.keep(found, time.perf_counter() - start):
-                    screen.generation(line, islands.config)
-                reason, examined = _over(islands, examiner)
+            drive([islands], scheduler, interrupted.is_set)
     finally:
         screen.close()
-        islands.close()
-    if reason is not None:
-        best = examined or examiner.best(islands.together(experiment))
-        conclude(folder, creature, screen, best)
-    report(folder, screen, reason, time.perf_counter() - began)
-    return reason is not None
-
-
-def _over(islands: "_Islands", examiner: Examiner) -> tuple[str | None, Examined | None]:
-    """Write the best as champion; return why the run is over, and what ended it, or None."""
-    experiment = examiner.experiment
-    state = islands.together(experiment)
-    if np.isfinite(state.fitness[0]):
-        with disk_errors(islands.folder):
-            champion = experiment.champion(state, versions())
-            write_champion(champion, experiment.creature, islands.folder / CHAMPION)
-    if reason := stop_reason(state, islands.config.evolution):
-        return reason, None
-    examined = examiner.early(state)
-    if examined is None:
-        return None, None
-    return why_ended(islands.generation, examined.certificate.margin), examined
+    if islands.ended:
+        best = islands.examined or examiner.best(islands.together())
+        conclude(folder, experiment.creature, screen, best)
+    report(folder, screen, islands.reason, time.perf_counter() - began)
+    return islands.ended
 
 
 class _Islands:
-    """States of the islands, on disk and in memory."""
+    """States of the islands, on disk and in memory.
 
-    def __init__(self, folder: Path, creature: Creature, config: Config, resume: bool) -> None:
-        self.folder, self.creature = folder, creature
+    Attributes:
+      reason: why the run is over; None before. examined: what ended it, if an examination did.
+    """
+
+    reason: str | None = None
+    examined: Examined | None = None
+
+    def __init__(self, folder: Path, examiner: Examiner, screen: Screen, resume: bool) -> None:
+        self.folder, self.examiner, self.screen = folder, examiner, screen
+        self.creature = creature = examiner.experiment.creature
+        config = examiner.experiment.config
         # A stuck island does not stop the run: others may still improve.
         forced = dataclasses.replace(config.evolution.forced, patience=0)
         evolution = dataclasses.replace(config.evolution, forced=forced)
@@ -219,18 +208,50 @@ class _Islands:
         self.store = Checkpoints(folder, config.keep_every)
         self.states: list[Packed | None] = [None] * self.settings.count
         self.generation = self._common() if resume else -1
+        self._next: list[Packed | None] | None = None
+        """States to continue from; None before a job needs them."""
+        self._began = 0.0
         self._return_to(self.generation)
 
-    def advance(self, scheduler: Scheduler, stopped: Callable[[], bool]) -> list[Advanced] | None:
-        """Advance all islands to the next exchange or to the end; None when stopped."""
+    @property
+    def jobs(self) -> int:
+        """Number of jobs that lead to the next exchange: one for each island."""
+        return self.settings.count
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run is over."""
+        return self.reason is not None
+
+    def job(self, number: int) -> tuple[Recipe, AdvanceIsland]:
+        """Return the job of one island, to the next exchange or to the end."""
+        if self._next is None:
+            self._next, self._began = self._sent(), time.perf_counter()
         stride = self.settings.every or self.config.checkpoint_every
         until = (max(self.generation, 0) // stride + 1) * stride
         until = min(until, self.config.evolution.generations)
-        sent = enumerate(self._sent())
-        work = ((self.recipe, AdvanceIsland(state, until, i)) for i, state in sent)
-        return scheduler.all(work, stopped)
+        return self.recipe, AdvanceIsland(self._next[number], until, number)
 
-    def keep(self, found: list[Advanced], seconds: float) -> Lines:
+    def keep(self, done: Sequence[Advanced]) -> None:
+        """Write all states to disk; show and examine the best."""
+        self._next, seconds = None, time.perf_counter() - self._began
+        for line in self._written(done, seconds):
+            self.screen.generation(line, self.config)
+        self._examine()
+
+    def _examine(self) -> None:
+        """Write the best as champion; set `reason` if the run is over."""
+        experiment, state = self.examiner.experiment, self.together()
+        if np.isfinite(state.fitness[0]):
+            with disk_errors(self.folder):
+                champion = experiment.champion(state, versions())
+                write_champion(champion, experiment.creature, self.folder / CHAMPION)
+        self.reason = stop_reason(state, self.config.evolution)
+        if self.reason is None and (examined := self.examiner.early(state)):
+            self.examined = examined
+            self.reason = why_ended(self.generation, examined.certificate.margin)
+
+    def _written(self, found: Sequence[Advanced], seconds: float) -> Lines:
         """Write all states to disk; return the metrics lines of all islands together.
 
         seconds: that the islands took.
@@ -252,10 +273,10 @@ class _Islands:
         )
         return lines
 
-    def together(self, experiment: Experiment) -> EvolutionState:
+    def together(self) -> EvolutionState:
         """Return the best of all islands as one state."""
         known = [state for state in self.states if state is not None]
-        return gathered(known).state(experiment.abstract(), str(self.folder))
+        return gathered(known).state(self.examiner.experiment.abstract(), str(self.folder))
 
     def close(self) -> None:
         """Wait until everything is on disk."""

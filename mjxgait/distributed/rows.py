@@ -9,6 +9,7 @@ import numpy as np
 
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
+from mjxgait.distributed.drive import drive
 from mjxgait.distributed.jobs import Advanced, AdvanceRows, Evaluate, Lines
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Scheduler
@@ -18,7 +19,7 @@ from mjxgait.training.checkpoint import Checkpoints, Packed, side_by_side
 from mjxgait.training.folder import METRICS, append_lines, open_run, truncate_metrics
 from mjxgait.types import Evaluation, RequestedTrials
 
-Tell = Callable[[int, int, Advanced | None], object]
+RowsProgress = Callable[[int, int, Advanced | None], object]
 """Called with the generation, the last generation, and the latest result, if there is one."""
 
 
@@ -28,6 +29,7 @@ class Rows:
     Attributes:
       sources: see `build_batch`. images: a row's second folder, if it has one, and the function
         that makes what is written there from its state.
+      planted: see `AdvanceRows`; of all rows.
       keep_every: see `Checkpoints`; by default only the latest generation stays.
       together: rows per job; 0: all, as those with sources must be.
     """
@@ -36,11 +38,14 @@ class Rows:
         self,
         creature: Creature,
         folders: Sequence[Path],
+        tell: RowsProgress,
         sources: Sequence[Sequence[int]] = (),
         images: Mapping[Path, tuple[Path, Callable[[Packed], Packed]]] | None = None,
+        planted: Mapping[str, np.ndarray] | None = None,
         keep_every: int | None = None,
         together: int = 0,
     ) -> None:
+        self._tell, self.planted = tell, planted
         self.creature, self.folders, self.images = creature, list(folders), images or {}
         self.configs: list[Config] = [open_run(folder)[1] for folder in folders]
         size = together or len(self.folders)
@@ -48,80 +53,80 @@ class Rows:
         self.recipes = [Recipe.of(creature, self.configs[piece], sources) for piece in self.pieces]
         self.last = self.configs[0].evolution.generations
         self.keep_every = keep_every or self.last + 1
+        self.state: Packed | None = None
+        self._stores: dict[Path, Checkpoints] = {}
 
-    def to_the_end(
-        self,
-        begin: Mapping[str, np.ndarray] | None,
-        scheduler: Scheduler,
-        tell: Tell,
-        stopped: Callable[[], bool],
-    ) -> Packed | None:
-        """Return the states [B] of the last generation; None when stopped.
-
-        begin: `AdvanceRows.planted` of all rows.
-        """
+    def to_the_end(self, scheduler: Scheduler, stopped: Callable[[], bool]) -> Packed | None:
+        """Return the states [B] of the last generation; None when stopped."""
         seconds = [folder for folder, _ in self.images.values()]
-        stores = {path: Checkpoints(path, self.keep_every) for path in [*self.folders, *seconds]}
-        try:
-            state = self._stored(stores)
-            stride = self.configs[0].checkpoint_every
-            generation = -1 if state is None else state.generation
-            if generation < self.last:
-                tell(generation, self.last, None)
-            while generation < self.last:
-                until = min((max(generation, 0) // stride + 1) * stride, self.last)
-                if (done := scheduler.all(self._work(state, begin, until), stopped)) is None:
-                    return None
-                advanced = _joined(done)
-                state, generation = advanced.packed, until
-                self._keep(stores, advanced)
-                tell(generation, self.last, advanced)
-            return state
-        finally:
-            for store in stores.values():
-                store.close()
+        self._stores = {p: Checkpoints(p, self.keep_every) for p in [*self.folders, *seconds]}
+        self.state = self._stored()
+        if not self.ended:
+            self._tell(self.generation, self.last, None)
+        return self.state if drive([self], scheduler, stopped) else None
 
-    def _work(
-        self, state: Packed | None, begin: Mapping[str, np.ndarray] | None, until: int
-    ) -> Iterator[tuple[Recipe, AdvanceRows]]:
-        for recipe, piece in zip(self.recipes, self.pieces, strict=True):
-            if state is not None:
-                yield recipe, AdvanceRows(state.rows(piece), until)
-            else:
-                planted = begin and {name: array[piece] for name, array in begin.items()}
-                yield recipe, AdvanceRows(None, until, planted)
+    @property
+    def generation(self) -> int:
+        """Generation that the rows have reached; -1 before the first."""
+        return -1 if self.state is None else self.state.generation
 
-    def _stored(self, stores: Mapping[Path, Checkpoints]) -> Packed | None:
+    @property
+    def jobs(self) -> int:
+        """Number of jobs that lead to the next stop: one for each piece."""
+        return len(self.pieces)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the rows have reached their last generation."""
+        return self.generation >= self.last
+
+    @property
+    def _next_stop(self) -> int:
+        stride = self.configs[0].checkpoint_every
+        return min((max(self.generation, 0) // stride + 1) * stride, self.last)
+
+    def job(self, number: int) -> tuple[Recipe, AdvanceRows]:
+        """Return the job of one piece."""
+        recipe, piece = self.recipes[number], self.pieces[number]
+        if self.state is not None:
+            return recipe, AdvanceRows(self.state.rows(piece), self._next_stop)
+        planted = self.planted and {name: array[piece] for name, array in self.planted.items()}
+        return recipe, AdvanceRows(None, self._next_stop, planted)
+
+    def keep(self, done: Sequence[Advanced]) -> None:
+        """Write the log first, the state last: resuming removes surplus lines."""
+        advanced = _joined(done)
+        self.state = advanced.packed
+        for row, folder in enumerate(self.folders):
+            state = advanced.packed.row(row)
+            lines = [line[row] for line in advanced.lines]
+            self._write(folder, state, lines)
+            if folder in self.images:
+                second, image = self.images[folder]
+                self._write(second, image(state), lines)
+        self._tell(self.generation, self.last, advanced)
+
+    def close(self) -> None:
+        """Wait until everything is on disk."""
+        for store in self._stores.values():
+            store.close()
+
+    def _stored(self) -> Packed | None:
         """Restore the latest generation that all folders have a checkpoint of; None if none."""
-        known = set.intersection(*(set(store.generations()) for store in stores.values()))
+        known = set.intersection(*(set(store.generations()) for store in self._stores.values()))
         common = max(known, default=-1)
-        for folder, store in stores.items():
+        for folder, store in self._stores.items():
             store.drop_after(common)
             truncate_metrics(folder / METRICS, common)
         if common < 0:
             return None
         return side_by_side(
-            [stores[folder].read(self.creature.digest, common) for folder in self.folders]
+            [self._stores[folder].read(self.creature.digest, common) for folder in self.folders]
         )
 
-    def _keep(self, stores: Mapping[Path, Checkpoints], advanced: Advanced) -> None:
-        for row, folder in enumerate(self.folders):
-            state = advanced.packed.row(row)
-            lines = [line[row] for line in advanced.lines]
-            self._write(stores, folder, state, lines)
-            if folder in self.images:
-                second, image = self.images[folder]
-                self._write(stores, second, image(state), lines)
-
-    def _write(
-        self,
-        stores: Mapping[Path, Checkpoints],
-        folder: Path,
-        state: Packed,
-        lines: Lines,
-    ) -> None:
+    def _write(self, folder: Path, state: Packed, lines: Lines) -> None:
         append_lines(folder / METRICS, lines)
-        stores[folder].keep(state, self.creature.name, self.creature.digest)
+        self._stores[folder].keep(state, self.creature.name, self.creature.digest)
 
 
 def _joined(pieces: Sequence[Advanced]) -> Advanced:

@@ -17,11 +17,12 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState, stop_reason
 from mjxgait.plugins.user_code import load_all, loaded
 from mjxgait.processes import one_per_core
+from mjxgait.training.advance import versions
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.examination import Examiner, Exams, due, why_ended
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.folder import CERTIFICATE, EXAMS, command, kept_champion, open_run
-from mjxgait.training.loop import conclude, versions
+from mjxgait.training.loop import conclude
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.stages import prepare_devices

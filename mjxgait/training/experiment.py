@@ -120,24 +120,16 @@ class Experiment:
 
         The episodes have leaves [N, R, ...].
         """
-        rows = _lone((genomes, starts or self.starts, self.row.settings))
+        rows = one_row((genomes, starts or self.starts, self.row.settings))
         episodes = self.simulator.simulate(*rows)
-        return Episodes(_only(episodes.stats), episodes.computed_steps)
+        return Episodes(row_of(episodes.stats), episodes.computed_steps)
 
     def compile(self, evaluator: Evaluator | None = None) -> Step:
-        """Compile a generation; `evaluator` evaluates it elsewhere."""
-        return self.step(self.stages(evaluates=evaluator is None), evaluator)
-
-    def stages(self, evaluates: bool = True) -> CompiledGeneration:
-        """See `Batch.stages`."""
-        return Batch((self,)).stages(evaluates)
-
-    def step(self, stages: CompiledGeneration, evaluator: Evaluator | None = None) -> Step:
-        """Return the generation with compiled programs of this shape."""
-        together = Batch((self,)).bound(stages, evaluator)
+        """Compile a generation of this run alone; `evaluator` evaluates it elsewhere."""
+        together = Batch((self,)).compile(evaluator)
 
         def alone(state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
-            return _only(together(_lone(state)))
+            return row_of(together(one_row(state)))
 
         return alone
 
@@ -323,14 +315,14 @@ def _experiment(creature: Creature, spec: SimulatorSpec, config: Config) -> Expe
     return Experiment(creature, config, spec, RunParams(traced(config), starts))
 
 
-def _lone(tree: Tree) -> Tree:
+def one_row(tree: Tree) -> Tree:
     """Add an axis of one row [1, ...] to all leaves."""
     return jax.tree.map(lambda leaf: leaf[None], tree)
 
 
-def _only(tree: Tree) -> Tree:
-    """Remove the axis of one row from all leaves."""
-    return jax.tree.map(lambda leaf: leaf[0], tree)
+def row_of(tree: Tree, row: int = 0) -> Tree:
+    """Return one row of leaves [B, ...]."""
+    return jax.tree.map(lambda leaf: leaf[row], tree)
 
 
 def _stack(trees: Sequence[Tree]) -> Tree:

@@ -15,7 +15,7 @@ import os
 import socket
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -122,6 +122,23 @@ def locked(folder: Path) -> Iterator[None]:
         with contextlib.suppress(OSError):  # the folder may be gone
             (folder / LOCK).unlink()
         file.close()
+
+
+@contextlib.contextmanager
+def locked_run(folder: Path, resume: bool, begin: Callable[[], object]) -> Iterator[None]:
+    """Begin a run and lock its folder within the block.
+
+    begin: makes the folder of a new run. One that is resumed is locked before.
+
+    Raises:
+      UserError: see `locked`.
+    """
+    if not resume:
+        begin()
+    with locked(folder):
+        if resume:
+            begin()
+        yield
 
 
 def running(run: Path) -> str | None:

@@ -49,6 +49,7 @@ TRAINED = {
     "walk": "tests/training/test_run.py",
     "hop": "tests/tasks/hop/test_hop.py",
     "limbo": "tests/tasks/hop/test_limbo.py",
+    "turn": "tests/tasks/turn/test_turn.py",
     "swim": "tests/tasks/modular/test_swimming.py",
     "follow-on-land": "tests/tasks/modular/test_roaming.py",
     **dict.fromkeys(("jump", "follow"), "tests/tasks/modular/test_roaming.py"),
@@ -56,8 +57,8 @@ TRAINED = {
 }
 """Tasks that another test evolves, and where.
 
-test_roaming.py evaluates individuals on land, and compares parts of its other tasks with the
-reference simulator; `--thorough` evolves them.
+test_roaming.py evaluates individuals on land, and test_hop.py those of `hop`; both compare parts of
+their tasks with the reference simulator, and `--thorough` evolves them.
 """
 EVOLVED = [way for way in first_of_each_task(WAYS) if task_of(way) not in TRAINED]
 

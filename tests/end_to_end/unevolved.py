@@ -18,22 +18,22 @@ from mjxgait.distributed.scheduler import LocalBackend, Report
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.simulation.evaluator import Evaluator
+from mjxgait.training.advance import Generations
 from mjxgait.training.checkpoint import pack
-from mjxgait.training.experiment import Experiment
+from mjxgait.training.experiment import Batch, Experiment, one_row, row_of
 from mjxgait.training.prescreen import Prescreen
-
-Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 
 
 def unevolved(
-    experiment: Experiment, evaluator: Evaluator | None, restored: EvolutionState | None
-) -> tuple[Step, EvolutionState]:
+    run: Batch, evaluator: Evaluator | None, restored: EvolutionState | None
+) -> Generations:
     """Stand in for `loop._compiled`: the first population stays, and no program is compiled.
 
     Body, settings, initial conditions and genomes are made as in a real run.
     """
+    (experiment,) = run.experiments
     step = partial(generation, follows=experiment.config.evolution.follows)
-    return step, embodied(experiment) if restored is None else restored
+    return Generations(step, run, one_row(embodied(experiment) if restored is None else restored))
 
 
 def embodied(experiment: Experiment) -> EvolutionState:
@@ -67,9 +67,10 @@ def _made_up(count: int) -> np.ndarray:
 
 
 def generation(
-    state: EvolutionState, follows: bool = False
+    states: EvolutionState, follows: bool = False
 ) -> tuple[EvolutionState, GenerationMetrics]:
-    """Return the same population, one generation later, and metrics of ones."""
+    """Return the same population of one row, one generation later, and metrics of ones."""
+    state = row_of(states)
     outcomes = _made_up(state.outcome.shape[-1])
     later = dataclasses.replace(
         state,
@@ -88,7 +89,7 @@ def generation(
         "mothers": jnp.zeros(state.fitness.shape, jnp.int32) if follows else None,
     }
     metrics = GenerationMetrics(**(numbers | known), level=state.level)
-    return jax.device_get((later, metrics))
+    return one_row((later, metrics))
 
 
 class Unevolved(LocalBackend):

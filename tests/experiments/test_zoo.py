@@ -41,9 +41,9 @@ def begun(zoo: Path, creature: Creature, together: int = 0) -> Path:
 
 def go_on(zoo: Path, creature: Creature, kind: type[Scheduler] = Scheduler) -> bool:
     seeds = read_seeds(zoo)
-    rows = Rows(creature, seeds.folders(zoo), keep_every=1, together=seeds.together)
-    scheduler = kind(Pretend())
-    return rows.to_the_end(None, scheduler, lambda *told: None, lambda: False) is not None
+    folders, together = seeds.folders(zoo), seeds.together
+    rows = Rows(creature, folders, lambda *told: None, keep_every=1, together=together)
+    return rows.to_the_end(kind(Pretend()), lambda: False) is not None
 
 
 @pytest.fixture(scope="module")

@@ -73,7 +73,7 @@ class Listener:
 def test_a_run_prints_the_note_before_it_compiles(
     note: str, said: list[str], stool: Creature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    experiment = SimpleNamespace(plant_note=note, init=lambda: None, config=small_config())
+    experiment = SimpleNamespace(creature=stool, plant_note=note, config=small_config())
     monkeypatch.setattr(loop, "build_experiment", lambda *_: experiment)
     screen = Listener()
     with pytest.raises(Ready):

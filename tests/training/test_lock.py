@@ -147,11 +147,10 @@ def test_a_new_run_is_locked_while_it_evolves(tmp_path: Path, capsys, monkeypatc
     run, seen = tmp_path / "run", []
 
     def train(folder, *given):
-        given[-1]()
         seen.append(running(folder))
         return True
 
-    monkeypatch.setattr("mjxgait.training.loop.train", train)
+    monkeypatch.setattr("mjxgait.training.loop._train", train)
     said_by(capsys, "train", "--env", STOOL, "--no-plots", "--out", run, code=0)
     assert seen == [ME]
     assert not (run / LOCK).exists()

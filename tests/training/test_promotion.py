@@ -18,7 +18,7 @@ from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.evolution import Evolution
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.evolution.variation import Box
-from mjxgait.training.experiment import Batch, Experiment, build_experiment
+from mjxgait.training.experiment import Batch, Experiment, build_experiment, row_of
 from mjxgait.training.generation import evolution_of, first_trials
 from mjxgait.types import Evaluation, RequestedTrials
 
@@ -30,11 +30,10 @@ Trials = tuple[Experiment, EvolutionState, GenerationMetrics, Callable[[np.ndarr
 def half(stool: Creature) -> Trials:
     rollout = {"starts": 3, "lanes": 4, "promote": 0.5}
     experiment = build_experiment(stool, small_config(rollout=rollout))
-    first, stages = experiment.place(experiment.init()), experiment.stages()
-    state, metrics = jax.device_get(experiment.step(stages)(first))
     batch = Batch((experiment,))
-    numbers, rows = batch.known
+    stages, (numbers, rows) = batch.stages(), batch.known
     states = batch.place(batch.init())
+    state, metrics = jax.device_get(row_of(batch.bound(stages)(states)))
     proposals, starts = stages.propose(numbers, rows, states)
     known = first_trials(states, proposals).known
     assert stages.evaluate is not None

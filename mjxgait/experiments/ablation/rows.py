@@ -3,14 +3,13 @@
 C MuJoCo evaluates all variants alike, whatever fitness they evolved for.
 """
 
-import contextlib
 import dataclasses
 import functools
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, cast
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion, read_champion, write_champion
 from mjxgait.config.traced import traced_structure
 from mjxgait.creature import Creature, load_creature
+from mjxgait.distributed.drive import drive
 from mjxgait.distributed.jobs import Advanced, AdvanceRows, Job
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Scheduler
@@ -100,26 +100,15 @@ def run_study(
       stride: generations between two checkpoints of a group.
     """
     parts = groups(plan)
-    left = {
-        number: _Group(folder, creature, plan, runs, number, stride)
+    left = [
+        _Group(folder, creature, plan, runs, number, partial(tell, number, len(parts)), stride)
         for number, runs in enumerate(parts)
         if not all(champion_path(folder, plan, run).exists() for run in runs)
-    }
-    with interruptible() as interrupted, contextlib.ExitStack() as at_last:
-        for number, group in left.items():
-            at_last.callback(group.close)
-            scheduler.submit(number, partial(group.work, partial(tell, number, len(parts))))
-        while left and (done := scheduler.next(interrupted.is_set)):
-            number, advanced = cast(tuple[int, Advanced], done)
-            group = left[number]
-            group.keep(advanced)
-            tell(number, len(parts), group.news(advanced))
-            if group.generation < group.last:
-                scheduler.submit(number, group.work, first=True)
-            else:
-                left.pop(number).close()
+    ]
+    with interruptible() as interrupted:
+        ended = drive(left, scheduler, interrupted.is_set)
         # Ctrl-C in the last generation: what would come next takes minutes too.
-        return not left and not interrupted.is_set()
+        return ended and not interrupted.is_set()
 
 
 class _Group:
@@ -132,9 +121,11 @@ class _Group:
         plan: Plan,
         runs: list[Run],
         number: int,
+        tell: Callable[[News], None],
         stride: int,
     ) -> None:
         self.study, self.creature, self.plan, self.runs = folder, creature, plan, runs
+        self.tell, self.jobs = tell, 1
         self.folder, self.stride = folder / GROUPS / str(number), stride
         self.last = max(run.generations for run in runs)
         self.recipe = Recipe.of(creature, [run.config for run in runs])
@@ -146,17 +137,23 @@ class _Group:
         """Generation that the rows have reached; -1 before the first."""
         return -1 if self.state is None else self.state.generation
 
-    def work(self, tell: Callable[[News], None] | None = None) -> tuple[Recipe, Job]:
-        """Return the next job. tell: only on the first call, which makes the folder."""
-        if tell:
+    @property
+    def ended(self) -> bool:
+        """Whether all rows have reached their last generation."""
+        return self.generation >= self.last
+
+    def job(self, number: int) -> tuple[Recipe, Job[Advanced]]:
+        """Return the next job; the first makes the folder."""
+        if self.checkpoints is None:
             self._begin()
-            tell({"compiling": len(self.runs)})
+            self.tell({"compiling": len(self.runs)})
         until = min(self.generation + self.stride, self.last)
         return self.recipe, AdvanceRows(self.state, until)
 
-    def keep(self, advanced: Advanced) -> None:
+    def keep(self, done: Sequence[Advanced]) -> None:
         """Write results to disk: the log first, the state last; resuming removes surplus lines."""
         assert self.checkpoints is not None
+        (advanced,) = done
         for lines in advanced.lines:
             self._log(lines)
         for row, champion in advanced.champions.items():
@@ -165,8 +162,9 @@ class _Group:
                 write_champion(champion, self.creature, path)
         self.state = advanced.packed
         self.checkpoints.keep(self.state, self.creature.name, self.creature.digest)
+        self.tell(self._news(advanced))
 
-    def news(self, advanced: Advanced) -> News:
+    def _news(self, advanced: Advanced) -> News:
         """Return the progress to report."""
         return {
             "generation": self.generation,

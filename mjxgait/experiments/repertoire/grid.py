@@ -16,7 +16,7 @@ from mjxgait.config.schema import Config
 from mjxgait.config.tables import STRICT, build, dump_toml, read_toml
 from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import Advanced
-from mjxgait.distributed.rows import Rows
+from mjxgait.distributed.rows import Rows, RowsProgress
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
 from mjxgait.tasks.walk.targets import WalkTargets, with_targets
@@ -194,17 +194,24 @@ def evolve(
     straight = [cell for cell in grid.cells if not cell.turn]
     both = not has_mirror(creature)
     turning = [cell for cell in grid.cells if cell.turn > 0 or (cell.turn and both)]
-    first = _side(folder, creature, grid, straight)
-    found = first.to_the_end(None, scheduler, partial(tell, "straight on"), stopped)
+    first = _side(folder, creature, grid, straight, partial(tell, "straight on"))
+    found = first.to_the_end(scheduler, stopped)
     if found is None or not turning:
         return found is not None
     by_speed = {cell.speed: found.row(row) for row, cell in enumerate(straight)}
     begin = planted(turning, by_speed)
-    second = _side(folder, creature, grid, turning)
-    return second.to_the_end(begin, scheduler, partial(tell, "turning"), stopped) is not None
+    second = _side(folder, creature, grid, turning, partial(tell, "turning"), begin)
+    return second.to_the_end(scheduler, stopped) is not None
 
 
-def _side(folder: Path, creature: Creature, grid: Grid, cells: Sequence[Cell]) -> Rows:
+def _side(
+    folder: Path,
+    creature: Creature,
+    grid: Grid,
+    cells: Sequence[Cell],
+    tell: RowsProgress,
+    begin: Mapping[str, np.ndarray] | None = None,
+) -> Rows:
     """Return cells as rows of one program.
 
     A symmetric body's right turns are mirror images of its left turns; they have folders, too.
@@ -217,4 +224,5 @@ def _side(folder: Path, creature: Creature, grid: Grid, cells: Sequence[Cell]) -
         for cell in cells
         if cell.turn and has_mirror(creature)
     }
-    return Rows(creature, [folder / cell.name for cell in cells], sources, images)
+    folders = [folder / cell.name for cell in cells]
+    return Rows(creature, folders, tell, sources, images, begin)

@@ -439,6 +439,7 @@ def test_a_user_file_can_have_settings_for_the_lamp_only(luxo: Creature, tmp_pat
     assert resolve_config(luxo.settings.train, "luxo", file).fitness.weights.time == 0.3
 
 
+@pytest.mark.thorough("test_limbo.py trains the lamp, and other tests here evaluate its hops")
 def test_a_short_run_ends_with_a_champion_and_a_certificate(tmp_path: Path, capsys):
     folder, short = tmp_path / "run", tmp_path / "short.toml"
     short.write_text(SHORT + "[hop]\nstay = 1.0\n")

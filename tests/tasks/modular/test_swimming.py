@@ -24,10 +24,10 @@ from mjxgait.rendering.genomes import bodies_of, draw_bodies, draw_graph
 from mjxgait.rendering.walk import record_walk
 from mjxgait.tasks.modular.config import SwimConfig
 from mjxgait.tasks.modular.task import FASTEST_HINGE, FURTHEST, Swim
+from mjxgait.training.advance import metrics_line
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.experiment import Experiment, Step, build_experiment
 from mjxgait.training.folder import METRICS, create_run
-from mjxgait.training.loop import metrics_line
 
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},

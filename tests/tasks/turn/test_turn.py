@@ -1,12 +1,15 @@
 """Turning on the spot: fitness terms and acceptance criteria."""
 
 import dataclasses
+import json
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from certify_made_up import walk
 from controllers.key_poses.test_stepping import seen
+from helpers import SHORT, STOOL, said_by
 
 from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.certification.config import CertificateConfig
@@ -122,6 +125,22 @@ def test_validation_starts_at_the_certificates_rate(stool: Creature):
         "away": np.zeros(3),
     }
     assert criteria.managed(outcome, 8.0, stool).tolist() == [True, False, False]
+
+
+def test_a_short_run_ends_with_a_champion_and_a_certificate(tmp_path: Path, capsys):
+    folder, short = tmp_path / "run", tmp_path / "short.toml"
+    short.write_text(SHORT)
+    small = "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.starts 2"
+    rest = "--rollout.promote 1 --rollout.lanes 4 --examination.candidates 0 --no-plots"
+    given = ("--env", STOOL, "--task", "turn", *small.split(), *rest.split())
+    said_by(capsys, "train", *given, "--out", folder, code=0)
+    champion = json.loads((folder / "champion.json").read_text())
+    assert set(champion["terms"]) == Turn.counts.keys()
+    assert set(champion["origin"]["nominal"]) == set(Turn.outcomes)
+    said_by(capsys, "certify", folder, "--config", short, code=0)
+    certificate = json.loads((folder / "certificate.json").read_text())
+    assert certificate["task"] == champion["task"] == "turn"
+    assert certificate["report"]["turn"] > 0.0
 
 
 def test_the_report_names_the_rate():
