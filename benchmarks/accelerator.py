@@ -155,8 +155,8 @@ def workload(options: argparse.Namespace, engine: str, lanes: int) -> tuple[Any,
     """Return the run to be measured and its individuals [1, N, ...], one per lane."""
     import jax
     import jax.numpy as jnp
+    from peers.workload import walking
 
-    from mjxgait.bench.workload import walking
     from mjxgait.config.layers import find_creature
     from mjxgait.creature import load_creature
     from mjxgait.training.experiment import Batch, build_experiment

@@ -24,8 +24,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from peers.machine import machine_facts
 
-from mjxgait.bench.machine import machine_facts
 from mjxgait.config.layers import find_creature
 from mjxgait.controllers import spd
 from mjxgait.creature import Creature, load_creature

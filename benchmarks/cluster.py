@@ -37,8 +37,7 @@ from mjxgait.config.schema import Config
 from mjxgait.config.tables import build, merge
 from mjxgait.creature import Creature
 from mjxgait.distributed.connect import connected
-from mjxgait.distributed.jobs import AdvanceRows, Job
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.jobs import AdvanceRows, Job, Recipe
 from mjxgait.distributed.rows import ChunkedEvaluator
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.plugins import resolve_config

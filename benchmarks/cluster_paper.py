@@ -23,8 +23,7 @@ from simulated import machines
 
 from mjxgait.cli.ablate import ROWS, STRIDE
 from mjxgait.distributed.connect import connected
-from mjxgait.distributed.jobs import Job
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.jobs import Job, Recipe
 from mjxgait.distributed.scheduler import Report, Scheduler, Worker
 
 RUNS, PEOPLE, BLOCK = 10_000, 1_000_000, 64

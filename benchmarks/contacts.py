@@ -29,8 +29,8 @@ import mujoco
 import numpy as np
 import tomli_w
 from mujoco import rollout
+from peers.machine import machine_facts
 
-from mjxgait.bench.machine import machine_facts
 from mjxgait.config.layers import data_folder
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import make_plant

@@ -20,8 +20,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from bodies import LANES, STEPS, follow, start, timed
+from peers.machine import machine_facts
 
-from mjxgait.bench.machine import machine_facts
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.creature import start_place

@@ -36,8 +36,8 @@ import numpy as np
 from mjxgait.certification import CertificateConfig, push_ladder
 from mjxgait.certification.certificate import half_point
 from mjxgait.certification.config import PushesConfig
+from mjxgait.certification.stress import slippery, sloping
 from mjxgait.certification.trials import simulate
-from mjxgait.certification.worlds import slippery, sloping
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.outcome import Fall, Outcome

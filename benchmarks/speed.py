@@ -1,7 +1,11 @@
-"""`mjxgait bench`: speed of the simulation against C MuJoCo, DART, and the machine's peak."""
+"""Speed of the simulation against C MuJoCo, DART and the machine's peak.
+
+python benchmarks/speed.py --json FILE
+"""
 
 import dataclasses
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,11 +18,11 @@ from mjxgait.errors import UserError
 from mjxgait.files import write_text
 
 if TYPE_CHECKING:
-    from mjxgait.bench.contest import Result
+    from peers.contest import Result
 
 
 @dataclasses.dataclass(frozen=True)
-class BenchOptions:
+class SpeedOptions:
     """Measure useful creature-steps per second against C MuJoCo and DART, by turns in one run.
 
     The contestants are a program in C around MuJoCo's functions, NumPy between batched steps of C
@@ -47,13 +51,19 @@ class BenchOptions:
     history: Path | None = None
 
 
-def bench_command(arguments: Sequence[str]) -> int:
-    """Return the exit code."""
-    options = tyro.cli(BenchOptions, args=list(arguments), prog="mjxgait bench")
+def main() -> None:
+    try:
+        compare(tyro.cli(SpeedOptions))
+    except UserError as error:
+        sys.exit(f"speed.py: {error}")
+
+
+def compare(options: SpeedOptions) -> None:
+    """Measure, write and print."""
     folders = _folders(options.env)
     if options.scaling and len(folders) > 1:
         raise UserError("--scaling measures one creature; name it with --env")
-    from mjxgait.bench.contest import append_history, ratio_table  # JAX takes a second to import
+    from peers.contest import append_history, ratio_table  # JAX takes a second to import
 
     results: list[Result] = []
     for folder in folders:
@@ -63,14 +73,13 @@ def bench_command(arguments: Sequence[str]) -> int:
             append_history(results[-1], options.history)
         print(_summary(results[-1]), flush=True)
     if options.scaling:
-        from mjxgait.bench.scaling import draw, scaling_points
+        from peers.scaling import draw, scaling_points
 
         results[0]["scaling"] = scaling_points(options.env[0], _say)
         _write(options.json, results[0])
         draw(results[0]["scaling"], options.json.with_suffix(".png"))
     print(ratio_table(results))
     print(f"written to {options.json}")
-    return 0
 
 
 def _folders(names: Sequence[str]) -> list[Path]:
@@ -82,7 +91,7 @@ def _folders(names: Sequence[str]) -> list[Path]:
     folders = [find_creature(name) for name in dict.fromkeys(names)]
     for folder in folders:
         if _grows(folder):
-            raise UserError(f"{folder.name}: its body grows, and bench needs one that is there")
+            raise UserError(f"{folder.name}: its body grows, and this needs one that is there")
     return folders
 
 
@@ -90,9 +99,9 @@ def _grows(folder: Path) -> bool:
     return load_creature(folder).settings.creature.grows
 
 
-def _measured(folder: Path, options: BenchOptions) -> "Result":
-    from mjxgait.bench.contest import contest
-    from mjxgait.bench.workload import walking
+def _measured(folder: Path, options: SpeedOptions) -> "Result":
+    from peers.contest import contest
+    from peers.workload import walking
 
     settings = load_creature(folder).settings
     config = walking(settings)
@@ -123,7 +132,7 @@ def _write(file: Path, result: Mapping[str, object]) -> None:
 
 
 def _summary(result: "Result") -> str:
-    from mjxgait.bench.contest import LABELS
+    from peers.contest import LABELS
 
     lines = []
     for name, rate in result["creature_steps_per_second"].items():
@@ -137,3 +146,7 @@ def _summary(result: "Result") -> str:
     arithmetic, cache = f"{share['flops']:.1%}", f"{share['cache_bytes']:.1%}"
     lines.append(f"of the measured peak: {arithmetic} of arithmetic, {cache} of cache traffic")
     return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 from rendering.made_up import metrics_line
 
-from mjxgait.distributed.jobs import Advanced, AdvanceRows
-from mjxgait.distributed.recipe import Programs, Recipe
+from mjxgait.distributed.jobs import Advanced, AdvanceRows, Programs, Recipe
 from mjxgait.distributed.scheduler import Report, Scheduler, Worker
 from mjxgait.experiments.repertoire.grid import POSES
 from mjxgait.training.checkpoint import pack

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from peers.scaling import Point, measure
 from rendering.made_up import treading, write_run
 
-from mjxgait.bench.scaling import Point, measure
 from mjxgait.creature import Creature
 from mjxgait.importer import import_model
 from mjxgait.processes import SAFE_PATH, process_per_core, python_command, safe_environment

@@ -16,11 +16,11 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
-from mjxgait.bench.mujoco_peer import Law, check_controller, quiet
-from mjxgait.bench.workload import Lap, Workload, bare_model
 from mjxgait.creature import Creature
 from mjxgait.processes import cores, single_threaded
 from mjxgait.reference.layout import LowestPoint
+from peers.mujoco_peer import Law, check_controller, quiet
+from peers.workload import Lap, Workload, bare_model
 
 SOURCE = Path(__file__).with_suffix(".c")
 COMPILERS = ("cc", "gcc", "clang")

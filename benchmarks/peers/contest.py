@@ -17,13 +17,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mjxgait.bench.c_peer import CPeer, NoCompiler, Workers, build
-from mjxgait.bench.machine import distance_to_limit, machine_facts, measured_peak, step_cost
-from mjxgait.bench.ours import Ours, as_workload, half_and_half, overhead
-from mjxgait.bench.workload import Lap, Workload
 from mjxgait.config.layers import install_command
 from mjxgait.config.schema import Config
 from mjxgait.processes import cores
+from peers.c_peer import CPeer, NoCompiler, Workers, build
+from peers.machine import distance_to_limit, machine_facts, measured_peak, step_cost
+from peers.ours import Ours, as_workload, half_and_half, overhead
+from peers.workload import Lap, Workload
 
 DART_STRIDE = 4
 """DART is so slow that it gets only every fourth genome."""
@@ -126,7 +126,7 @@ def append_history(result: Result, file: Path) -> None:
 
 def _peers(work: Workload) -> tuple[dict[str, Workers], dict[str, str]]:
     """Return the contestants by name (see `LABELS`), and for each one left out the reason."""
-    from mjxgait.bench.mujoco_peer import MujocoPeer
+    from peers.mujoco_peer import MujocoPeer
 
     peers: dict[str, Workers] = {}
     left_out: dict[str, str] = {}
@@ -141,7 +141,7 @@ def _peers(work: Workload) -> tuple[dict[str, Workers], dict[str, str]]:
     if importlib.util.find_spec("dartpy") is None:
         left_out["dart"] = f"dartpy is not installed: {install_command('peers')}"
         return peers, left_out
-    from mjxgait.bench.dart_peer import DartPeer, Unsupported, check_supported
+    from peers.dart_peer import DartPeer, Unsupported, check_supported
 
     try:
         check_supported(work.creature())

@@ -10,9 +10,9 @@ import dartpy  # type: ignore[import-not-found,unused-ignore]
 import mujoco
 import numpy as np
 
-from mjxgait.bench.mujoco_peer import Law
-from mjxgait.bench.workload import Workload
 from mjxgait.creature import Creature
+from peers.mujoco_peer import Law
+from peers.workload import Workload
 
 FREE_DOFS = 6
 LANES = 32

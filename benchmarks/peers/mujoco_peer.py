@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from mjxgait.bench.workload import Workload
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.reference.layout import Layout, LowestPoint
+from peers.workload import Workload
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 LANES = 128

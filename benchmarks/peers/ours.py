@@ -14,7 +14,6 @@ import jax.numpy as jnp
 import numpy as np
 from rich.console import Console
 
-from mjxgait.bench.workload import Lap, Workload
 from mjxgait.config.schema import Config
 from mjxgait.controllers.key_poses.controller import TUNING, Genome
 from mjxgait.creature import load_creature
@@ -29,6 +28,7 @@ from mjxgait.training.generation import evolution_of, next_starts
 from mjxgait.training.screen import Screen
 from mjxgait.training.stages import prepare_devices
 from mjxgait.types import Evaluation
+from peers.workload import Lap, Workload
 
 
 class Ours:

@@ -66,8 +66,8 @@ def measure(creature: str, point: Point) -> dict[str, float]:
     """Measure one point, in a new process."""
     arguments = [creature, json.dumps(dataclasses.asdict(point))]
     result = subprocess.run(
-        python_command("mjxgait.bench.scaling", *arguments),
-        env=safe_environment(),
+        python_command("peers.scaling", *arguments),
+        env=safe_environment() | {"PYTHONPATH": str(Path(__file__).parents[1])},
         capture_output=True,
         text=True,
         check=True,
@@ -80,10 +80,10 @@ def measure_here(creature: str, point: Point) -> dict[str, float]:
 
     Memory is the peak in MiB.
     """
-    from mjxgait.bench.ours import Ours
-    from mjxgait.bench.workload import walking
     from mjxgait.config.layers import find_creature
     from mjxgait.creature import load_creature
+    from peers.ours import Ours
+    from peers.workload import walking
 
     folder = find_creature(creature)
     config = walking(load_creature(folder).settings)

@@ -1,8 +1,13 @@
-"""Stress tests: uneven ground and larger disturbances (docs/reference/certificate.md).
+"""A harder test than the certificate: bumps, slopes, slippery floors, pushes and ten minutes of walking.
+
+Each function returns the creature with another model. Its parts, their masses and all indices stay
+the same, so `simulate` accepts it with every champion of the creature. Uneven ground is set by the
+creature's `terrain`: `creature.on("rough:0.05")`.
 
 Letters: `S` simulations.
 """
 
+import copy
 import dataclasses
 from collections.abc import Callable, Iterator
 
@@ -10,13 +15,35 @@ import numpy as np
 
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import common, simulate
-from mjxgait.certification.worlds import slippery
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.reference.layout import start_frame
 from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.starts import Starts, perturbed_starts, pushed_starts
+
+
+def sloping(creature: Creature, angle: float) -> Creature:
+    """Return the creature on ground that rises forward by `angle` rad; a negative angle descends.
+
+    Gravity is tilted, not the floor: heights are perpendicular to the slope, and the balance
+    correction takes the slope for level.
+    """
+    model = copy.copy(creature.model)
+    forward = (creature.frame.stand_rot @ creature.frame.forward) * [1.0, 1.0, 0.0]
+    forward /= np.linalg.norm(forward)
+    model.opt.gravity[:] = model.opt.gravity[2] * (
+        np.sin(angle) * forward + [0.0, 0.0, np.cos(angle)]
+    )
+    return dataclasses.replace(creature, model=model)
+
+
+def slippery(creature: Creature, friction: float) -> Creature:
+    """Return the creature with this coefficient of sliding friction at every contact."""
+    model = copy.copy(creature.model)
+    model.geom_friction[:, 0] = friction
+    return dataclasses.replace(creature, model=model)
+
 
 FLOORS = 4
 """Number of rough floors among which the starts are divided."""

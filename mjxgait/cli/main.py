@@ -28,7 +28,6 @@ COMMANDS = {
     "view": "watch a run as it learns on a local page: mjxgait view RUN",
     "import": "make a creature folder from a model file: mjxgait import robot.urdf --out envs/mine",
     "check": "validate a creature folder and draw it: mjxgait check envs/mine",
-    "bench": "measure the speed against C MuJoCo and DART: mjxgait bench --json FILE",
     "ablate": "compare settings over seeds, with error bars: mjxgait ablate forced_evolution --out "
     "DIR",
     "envs": "list the shipped creatures and configs",
@@ -36,6 +35,9 @@ COMMANDS = {
 """Each is `<name>_command` in mjxgait/cli/<name>.py (`import` in import_.py), imported only when it
 is called.
 """
+
+MOVED = {"bench": "python benchmarks/speed.py measures the speed, in a checkout of the repository"}
+"""What does the work of subcommands that are gone."""
 
 OWN_PARTS = ("--controller", "--task")
 """Options of every subcommand that name user-defined code."""
@@ -90,6 +92,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         )
         sys.exit(0 if given else 2)
     try:
+        if given[0] in MOVED:
+            raise UserError(MOVED[given[0]])
         if given[0] not in COMMANDS:
             raise UserError(f'unknown subcommand "{given[0]}"; {did_you_mean(given[0], COMMANDS)}')
         module = importlib.import_module(

@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Protocol, cast
 
-from mjxgait.distributed.jobs import Advanced, Job
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.jobs import Advanced, Job, Recipe
 from mjxgait.distributed.scheduler import Scheduler
 
 

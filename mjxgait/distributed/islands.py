@@ -17,8 +17,7 @@ from mjxgait.config.evolution import IslandsConfig
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.distributed.drive import drive
-from mjxgait.distributed.jobs import Advanced, AdvanceIsland, Lines
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.jobs import Advanced, AdvanceIsland, Lines, Recipe
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.evolution.state import EvolutionState, stop_reason
 from mjxgait.training.advance import versions

@@ -19,8 +19,7 @@ from typing_extensions import override
 
 from mjxgait.distributed import connect
 from mjxgait.distributed.connect import Machine
-from mjxgait.distributed.jobs import Job
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.jobs import Job, Recipe
 from mjxgait.distributed.scheduler import Backend, Report, Worker
 from mjxgait.distributed.worker import RemoteWorker
 

@@ -10,8 +10,7 @@ import numpy as np
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.distributed.drive import drive
-from mjxgait.distributed.jobs import Advanced, AdvanceRows, Evaluate, Lines
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.jobs import Advanced, AdvanceRows, Evaluate, Lines, Recipe
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
 from mjxgait.tasks.starts import Starts

@@ -13,8 +13,7 @@ from typing import Any, Protocol, TypeVar
 
 from typing_extensions import override
 
-from mjxgait.distributed.jobs import Job
-from mjxgait.distributed.recipe import Programs, Recipe
+from mjxgait.distributed.jobs import Job, Programs, Recipe
 from mjxgait.errors import UserError
 
 Result = TypeVar("Result")

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
-    from mjxgait.distributed.jobs import Job
-    from mjxgait.distributed.recipe import Recipe
+    from mjxgait.distributed.jobs import Job, Recipe
 
 Result = TypeVar("Result")
 
@@ -35,7 +34,7 @@ class RemoteWorker:
 
     def __init__(self, tag: str) -> None:
         os.environ.update(ENVIRONMENT)
-        from mjxgait.distributed.recipe import Programs
+        from mjxgait.distributed.jobs import Programs
         from mjxgait.training.stages import prepare_devices
 
         prepare_devices(1, tag)

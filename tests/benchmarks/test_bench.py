@@ -10,16 +10,17 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import STOOL, made_up_evaluate, pose_champion, said_by, small_config
+import speed
+import tyro
+from helpers import STOOL, made_up_evaluate, pose_champion, small_config
+from peers import c_peer, contest, machine
+from peers.machine import count_flops
+from peers.mujoco_peer import DampedSolve, Law, MujocoPeer
+from peers.ours import as_workload
+from peers.scaling import draw
+from peers.workload import Lap, Workload, walking
 
 import mjxgait.processes
-from mjxgait.bench import c_peer, contest, machine
-from mjxgait.bench.machine import count_flops
-from mjxgait.bench.mujoco_peer import DampedSolve, Law, MujocoPeer
-from mjxgait.bench.ours import as_workload
-from mjxgait.bench.scaling import draw
-from mjxgait.bench.workload import Lap, Workload, walking
-from mjxgait.cli import bench
 from mjxgait.config.layers import data_folder, find_creature
 from mjxgait.config.schema import Config
 from mjxgait.controllers.key_poses.reference import READS, PoseReference
@@ -134,7 +135,7 @@ def test_fallen_episodes_free_their_lanes(workload):
 
 @NEEDS_DART
 def test_dart_walks_the_same_way_at_first(workload):
-    from mjxgait.bench.dart_peer import DartPeer
+    from peers.dart_peer import DartPeer
 
     steps, forward = DartPeer(workload, 0, 1).lap()
     peer_steps, peer_forward = MujocoPeer(workload, 0, 1).lap()
@@ -144,7 +145,7 @@ def test_dart_walks_the_same_way_at_first(workload):
 
 @NEEDS_DART
 def test_dart_names_a_creature_that_it_cannot_rebuild(creature):
-    from mjxgait.bench.dart_peer import Unsupported, check_supported
+    from peers.dart_peer import Unsupported, check_supported
 
     check_supported(creature)
     with pytest.raises(Unsupported, match="two crossing ones"):
@@ -246,6 +247,11 @@ def test_history_has_a_line_per_run(tmp_path):
     assert lines[0]["ratio_over_c"] == 1
 
 
+def run(arguments: list[str]) -> None:
+    """Measure as the script does."""
+    speed.compare(tyro.cli(speed.SpeedOptions, args=arguments))
+
+
 def made_up_result(folder, options):
     """Result of a contest, without running one."""
     costs = {"ours": {"median": 3.0}, "c": {"median": 9.0}}
@@ -263,10 +269,10 @@ def made_up_result(folder, options):
 
 
 def test_the_command_measures_several_creatures(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(bench, "_measured", made_up_result)
+    monkeypatch.setattr(speed, "_measured", made_up_result)
     file, history = tmp_path / "bench.json", tmp_path / "history.jsonl"
     asked = ["--json", str(file), "--history", str(history), "--env", "duck", "alien"]
-    assert bench.bench_command(asked) == 0
+    run(asked)
     found = json.loads(file.read_text(encoding="utf-8"))
     assert list(found["ratios"]) == list(found["creatures"]) == ["duck", "alien"]
     assert found["ratios"]["alien"] == {"ratio_over_c": 2.9, "ratio_over_dart": None}
@@ -278,23 +284,23 @@ def test_the_command_measures_several_creatures(tmp_path, monkeypatch, capsys):
 
 
 def test_all_means_every_shipped_creature_except_modular_ones(tmp_path, monkeypatch):
-    monkeypatch.setattr(bench, "_measured", made_up_result)
-    bench.bench_command(["--json", str(tmp_path / "bench.json"), "--env", "all"])
+    monkeypatch.setattr(speed, "_measured", made_up_result)
+    run(["--json", str(tmp_path / "bench.json"), "--env", "all"])
     found = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))
     shipped = {path.name for path in data_folder("envs").iterdir()}
     assert list(found["ratios"]) == sorted(shipped - {"blocks"})
 
 
 def test_the_result_of_one_creature_is_written_unchanged(tmp_path, monkeypatch):
-    monkeypatch.setattr(bench, "_measured", made_up_result)
-    bench.bench_command(["--json", str(tmp_path / "bench.json")])
+    monkeypatch.setattr(speed, "_measured", made_up_result)
+    run(["--json", str(tmp_path / "bench.json")])
     found = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))
     assert found == made_up_result(find_creature("tall_quadruped"), None)
 
 
 def test_the_curves_need_a_single_creature(tmp_path):
     with pytest.raises(UserError, match="--scaling measures one creature"):
-        bench.bench_command(["--json", str(tmp_path / "b.json"), "--env", "all", "--scaling"])
+        run(["--json", str(tmp_path / "b.json"), "--env", "all", "--scaling"])
 
 
 MADE_UP_COST = {"flops_asked": 2.0, "flops": 3.0, "bytes": 5.0, "state_bytes": 1.0}
@@ -317,7 +323,7 @@ SIMULATED = pytest.mark.thorough("compiles the whole; each part has tests of its
 @pytest.mark.parametrize(
     "simulated", [False, pytest.param(True, marks=SIMULATED)], ids=["made up", "simulated"]
 )
-def test_the_command_writes_the_ratios(tmp_path, capsys, request, simulated):
+def test_the_command_writes_the_ratios(tmp_path, request, simulated):
     """The starts vary by generation, as for the shipped bodies."""
     if not simulated:
         request.getfixturevalue("unsimulated")
@@ -329,7 +335,7 @@ def test_the_command_writes_the_ratios(tmp_path, capsys, request, simulated):
         *("--json", file, "--env", body),
         *("--rounds", 1, "--generations", 1, "--population", 8),
     ]
-    said_by(capsys, "bench", *arguments, code=0)
+    run([str(word) for word in arguments])
     found = json.loads(file.read_text(encoding="utf-8"))
     assert found["ratio_over_mujoco_c"] > 0
     assert found["workload"]["starts"] == walking(load_creature(body).settings).rollout.starts

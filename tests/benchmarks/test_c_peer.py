@@ -6,16 +6,16 @@ import shutil
 import mujoco
 import numpy as np
 import pytest
-
-from mjxgait.bench import c_peer, contest
-from mjxgait.bench.c_peer import (
+from peers import c_peer, contest
+from peers.c_peer import (
     COMPILERS,
     CPeer,
     NoCompiler,
     build,
 )
-from mjxgait.bench.mujoco_peer import MujocoPeer
-from mjxgait.bench.workload import Workload, bare_model
+from peers.mujoco_peer import MujocoPeer
+from peers.workload import Workload, bare_model
+
 from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Config
 from mjxgait.creature import load_creature

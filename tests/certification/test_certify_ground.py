@@ -7,8 +7,8 @@ from certify_made_up import make_champion
 
 from mjxgait.certification.certificate import record
 from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.stress import slippery
 from mjxgait.certification.trials import simulate
-from mjxgait.certification.worlds import slippery
 from mjxgait.reference.layout import LowestPoint
 from mjxgait.reference.measure import measure
 from mjxgait.reference.starts import nominal_starts

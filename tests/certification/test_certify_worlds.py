@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
+from mjxgait.certification.stress import slippery, sloping
 from mjxgait.certification.trials import simulate
-from mjxgait.certification.worlds import slippery, sloping
 from mjxgait.reference.outcome import Fall
 from mjxgait.reference.starts import perturbed_starts
 

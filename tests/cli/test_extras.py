@@ -37,7 +37,8 @@ def test_named_extras_exist():
     known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     used = {
         text.partition("install_command('")[2].partition("'")[0]
-        for file in (ROOT / "mjxgait").rglob("*.py")
+        for folder in ("mjxgait", "benchmarks")
+        for file in (ROOT / folder).rglob("*.py")
         for text in file.read_text(encoding="utf-8").splitlines()
         if "install_command('" in text
     }

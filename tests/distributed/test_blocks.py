@@ -6,8 +6,7 @@ import pytest
 from helpers import made_up_evaluate, small_config
 
 from mjxgait.creature import Creature
-from mjxgait.distributed.jobs import AdvanceRows
-from mjxgait.distributed.recipe import Programs, Recipe
+from mjxgait.distributed.jobs import AdvanceRows, Programs, Recipe
 from mjxgait.distributed.rows import ChunkedEvaluator, block_size
 from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.errors import UserError

@@ -16,7 +16,7 @@ import mjxgait
 from mjxgait.champion import read_champion
 from mjxgait.creature import Creature
 from mjxgait.distributed import islands
-from mjxgait.distributed.recipe import Programs
+from mjxgait.distributed.jobs import Programs
 from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.inspect.sections import island_facts
 from mjxgait.training import stages

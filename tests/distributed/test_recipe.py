@@ -8,7 +8,7 @@ from helpers import small_config
 
 from mjxgait.creature import Creature
 from mjxgait.distributed.connect import Machine, mismatch, require_same, this
-from mjxgait.distributed.recipe import Recipe, UserCode
+from mjxgait.distributed.jobs import Recipe, UserCode
 from mjxgait.errors import UserError
 from mjxgait.plugins.registry import find
 from mjxgait.plugins.user_code import load, loaded

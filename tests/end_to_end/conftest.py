@@ -23,7 +23,7 @@ from mjxgait.cli import main
 from mjxgait.config.tables import build
 from mjxgait.creature import overlap
 from mjxgait.distributed import evolve as board
-from mjxgait.distributed.recipe import Programs
+from mjxgait.distributed.jobs import Programs
 from mjxgait.distributed.scheduler import LocalBackend
 from mjxgait.experiments.ablation import findings, rows
 from mjxgait.training import loop

@@ -19,7 +19,6 @@ from mjxgait.training.folder import CERTIFICATE, open_run
 ELSEWHERE = {
     "train": "tests/end_to_end/test_trainings.py::test_a_training_ends_with_a_certificate",
     "ablate": "tests/end_to_end/test_studies.py::test_a_study_ends_with_its_report",
-    "bench": "tests/bench/test_bench.py::test_the_command_writes_the_ratios",
     "view": "tests/web/test_live.py",
 }
 """Subcommands with their own tests, and where."""

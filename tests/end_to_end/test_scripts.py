@@ -32,6 +32,7 @@ ELSEWHERE = {
     "blender.py": BLENDER,
     "cluster.py": RAY,
     "cluster_faults.py": RAY,
+    "speed.py": "tests/benchmarks/test_bench.py",
     "fuzz_readers.py": "needs atheris; tests/animation/keys/test_hostile_keys.py and tests/importer/test_fuzz.py change files too",
     "plant_faults.py": "tests/test_faults.py runs it on a tree of its own",
 }

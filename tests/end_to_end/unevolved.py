@@ -12,8 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.champion import Champion
-from mjxgait.distributed.jobs import Advanced, AdvanceRows
-from mjxgait.distributed.recipe import Programs, Recipe
+from mjxgait.distributed.jobs import Advanced, AdvanceRows, Programs, Recipe
 from mjxgait.distributed.scheduler import LocalBackend, Report
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics

@@ -21,8 +21,7 @@ from mjxgait.champion import Champion, read_champion, write_champion
 from mjxgait.config.traced import traced_structure
 from mjxgait.creature import Creature, load_creature
 from mjxgait.distributed.drive import drive
-from mjxgait.distributed.jobs import Advanced, AdvanceRows, Job
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.jobs import Advanced, AdvanceRows, Job, Recipe
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.experiments.ablation.plan import Plan, Run, Study
 from mjxgait.plugins.user_code import load_all, loaded

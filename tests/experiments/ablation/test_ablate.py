@@ -23,7 +23,7 @@ from helpers import STOOL, made_up_evaluate, said_by
 import mjxgait.processes
 from mjxgait.cli import main
 from mjxgait.distributed import evolve
-from mjxgait.distributed.recipe import Programs
+from mjxgait.distributed.jobs import Programs
 from mjxgait.distributed.scheduler import LocalBackend
 from mjxgait.errors import INTERRUPTED
 from mjxgait.experiments.ablation import findings, rows
