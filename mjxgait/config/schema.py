@@ -61,6 +61,7 @@ class RolloutConfig:
       step: s; simulation step of bodies that grow; 0 takes that of creature.xml.
       variety: multiple of the perturbed starts to draw in all; each generation takes the next ones.
         Above 1 every individual must be evaluated anew: `evolution.elite`.
+      hold: generations that have the same perturbed starts, before the next ones come.
       joint_noise: rad; half width of the uniform perturbation of each joint at a perturbed start.
       velocity_noise: rad/s; the same for the speeds of the joints.
       friction: range of the factor on the floor's friction.
@@ -97,6 +98,7 @@ class RolloutConfig:
     promote: Annotated[Share, SHAPE] = 0.25
     step: Annotated[NonNegative, SHAPE] = 0.0
     variety: Annotated[Count, SHAPE] = 1
+    hold: Count = 1
     joint_noise: NonNegative = 0.1
     velocity_noise: NonNegative = 0.3
     friction: tuple[Positive, Positive] = (0.8, 1.2)

@@ -202,15 +202,16 @@ def next_starts(task: Task, row: RunParams, state: EvolutionState) -> Starts:
     """Return the starts [R] of the next generation, at its curriculum level."""
     starts = row.starts
     if row.settings.rollout.variety > 1:
-        starts = _of_round(row, jnp.maximum(state.generation + 1, 0))
+        generation = jnp.maximum(state.generation + 1, 0)
+        starts = _of_round(row, generation // row.settings.rollout.hold)
     if state.level is None:
         return starts
     return task.at_level(starts, row.settings.fitness, state.level)
 
 
-def _of_round(row: RunParams, generation: jax.Array) -> Starts:
-    """Return the nominal start, and the next of the others in turn."""
+def _of_round(row: RunParams, number: jax.Array) -> Starts:
+    """Return the nominal start, and those of the others whose turn it is in a round."""
     others = row.settings.rollout.starts - 1
-    turn = 1 + (generation * others + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
+    turn = 1 + (number * others + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
     places = jnp.append(0, turn)
     return jax.tree.map(lambda leaf: leaf[places], row.starts)

@@ -11,6 +11,7 @@ from helpers import small_config
 from mjxgait.controllers.key_poses.config import HOLDS
 from mjxgait.creature import Creature
 from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.state import EvolutionState
 from mjxgait.simulation.rollout import CHECK_EVERY
 from mjxgait.tasks.starts import NEVER, Starts, draw_starts
 from mjxgait.training.experiment import Experiment, build_experiment
@@ -152,6 +153,27 @@ def test_every_held_command_ends_with_a_round():
     assert all(CHECK_EVERY % steps == 0 for steps in HOLDS)
 
 
+def frictions(experiment: Experiment, state: EvolutionState, generation: int) -> list[float]:
+    """Friction of the floor in each start of a generation."""
+    latest = dataclasses.replace(state, generation=jnp.int32(generation - 1))
+    return np.asarray(
+        next_starts(experiment.simulator.task, experiment.row, latest).friction
+    ).tolist()
+
+
+def test_held_starts_change_every_third_generation(stool: Creature):
+    config = small_config(
+        rollout={"starts": 3, "variety": 4, "hold": 3, "friction": (0.6, 1.4)},
+        evolution={"survival": "children", "elite": 0.1},
+    )
+    experiment = build_experiment(stool, config)
+    state = experiment.init()
+    first, *rest = (frictions(experiment, state, generation) for generation in range(-1, 7))
+    assert rest[:3] == [first] * 3
+    assert rest[3:6] == [rest[3]] * 3
+    assert len({tuple(one) for one in rest}) == 3
+
+
 def test_generations_have_different_starts_until_the_cycle_repeats(stool: Creature):
     config = small_config(
         rollout={"starts": 3, "variety": 4, "friction": (0.6, 1.4)},
@@ -160,13 +182,7 @@ def test_generations_have_different_starts_until_the_cycle_repeats(stool: Creatu
     experiment = build_experiment(stool, config)
     state = experiment.init()
 
-    def told(generation: int) -> list[float]:
-        latest = dataclasses.replace(state, generation=generation - 1)
-        return np.asarray(
-            next_starts(experiment.simulator.task, experiment.row, latest).friction
-        ).tolist()
-
-    rounds = [told(generation) for generation in range(5)]
+    rounds = [frictions(experiment, state, generation) for generation in range(5)]
     assert {friction[0] for friction in rounds} == {1.0}
     assert len({friction for one in rounds[:4] for friction in one[1:]}) == 8
     assert rounds[4] == rounds[0]
