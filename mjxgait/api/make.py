@@ -69,6 +69,7 @@ def train(
     style: Place | None = None,
     certificate: str | None = None,
     expressions: Place | None = None,
+    source: Place | None = None,
     seed: int = 0,
     population: int | None = None,
     generations: int | None = None,
@@ -91,7 +92,8 @@ def train(
         "0.4bl/s", a name, deg/s to the left, deg/s to either side, a name or a file.
       certificate: walks, or anywhere (docs/reference/certificate.md).
       expressions: file of initial programs, for the controller program
-        (docs/reference/expressions.md). seed, population, generations: the settings that are
+        (docs/reference/expressions.md).
+      source: an earlier run; its last population is the first of this one. seed, population, generations: the settings that are
         changed most often.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
       quiet: prints nothing.
@@ -123,7 +125,7 @@ def train(
         chosen = with_expressions(creature, chosen, Path(expressions))
     folder = check_run(Path(out) if out else None, creature, chosen)
     begin = partial(create_run, folder, creature, chosen)
-    return _evolved(folder, creature, chosen, quiet, begin)
+    return _evolved(folder, creature, chosen, quiet, begin, Path(source) if source else None)
 
 
 def refine(
@@ -178,9 +180,17 @@ def refine(
 
 
 def _evolved(
-    folder: Path, creature: Creature, config: Config, quiet: bool, begin: Callable[[], object]
+    folder: Path,
+    creature: Creature,
+    config: Config,
+    quiet: bool,
+    begin: Callable[[], object],
+    source: Path | None = None,
 ) -> Run:
-    """Evolve and examine a run in a new folder; return it. begin: makes the folder."""
+    """Evolve and examine a run in a new folder; return it.
+
+    begin: makes the folder. source: see `evolve`.
+    """
     from rich.console import Console
 
     from mjxgait.training.screen import Screen
@@ -188,7 +198,7 @@ def _evolved(
 
     prepare_devices()
     screen = Screen(Console(quiet=True)) if quiet else Screen()
-    evolve(folder, creature, config, screen, begin=begin)
+    evolve(folder, creature, config, screen, begin=begin, source=source)
     return Run(folder)
 
 
@@ -201,18 +211,29 @@ def evolve(
     generation: int | None = None,
     cluster: str | None = None,
     begin: Callable[[], object] = lambda: None,
+    source: Path | None = None,
 ) -> bool:
     """Evolve a run, here or on a cluster; return whether it came to its end.
 
+    source: earlier run; its last population is the first of the new one.
+
     For the arguments and errors see `training.loop.train` and `distributed.evolve.evolve`.
     """
-    if cluster or config.evolution.islands.count > 1:
+    from mjxgait.training.initial import initial_of
+
+    elsewhere = cluster or config.evolution.islands.count > 1
+    if source and elsewhere:
+        raise UserError(f"--from {source}: not for islands, nor on a cluster")
+    if elsewhere:
         from mjxgait.distributed.evolve import evolve as across
 
         return across(folder, creature, config, screen, resume, generation, cluster, begin)
     from mjxgait.training import loop
 
-    return loop.train(folder, creature, config, screen, resume, generation, begin=begin)
+    initial = initial_of(source) if source else None
+    return loop.train(
+        folder, creature, config, screen, resume, generation, begin=begin, initial=initial
+    )
 
 
 def _use(**named: str | None) -> dict[str, str]:

@@ -62,6 +62,8 @@ class TrainOptions:
         (docs/guide/gaits.md).
       expressions: File of handwritten programs as the start of evolution, for --controller program
         (docs/reference/expressions.md).
+      source: Run folder whose last population is the first of the new run: another task or other
+        settings for what evolved there.
       out: Folder for the run; by default a new one under runs/.
       runs: Number of separate runs side by side, with seeds from --seed on: a folder with a run
         folder each, and a picture of all champions (docs/guide/studies.md).
@@ -99,6 +101,7 @@ class TrainOptions:
     scale: tuple[str, ...] = ()
     way: Way = "forward"
     expressions: Path | None = None
+    source: Annotated[Path | None, tyro.conf.arg(name="from")] = None
     out: Path | None = None
     runs: int | None = None
     resume: Path | None = None
@@ -137,6 +140,8 @@ def train_command(arguments: Sequence[str]) -> int:
             f"{options.resume}: a resumed run keeps the programs that it began with; --expressions "
             "needs a new run"
         )
+    if options.source and (options.resume or options.runs is not None):
+        raise UserError("--from: for a single new run, without --resume and --runs")
     if said := hint(config):
         print(said)
     if options.runs is not None or _is_zoo(options.resume):
@@ -186,7 +191,7 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
                 beside.enter_context(following(folder))
 
         at = options.generation, options.cluster
-        ended = evolve(folder, creature, config, screen, resumed, *at, begin)
+        ended = evolve(folder, creature, config, screen, resumed, *at, begin, options.source)
     if ended:
         screen.next_steps(folder, Run(folder).certified)
     drawn = _draw(folder, screen, all_plots=ended and options.plots)

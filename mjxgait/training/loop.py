@@ -36,6 +36,14 @@ from mjxgait.training.folder import (
     read_metrics,
     truncate_metrics,
 )
+from mjxgait.training.initial import (
+    Genomes,
+    Initial,
+    check_initial,
+    keep_initial,
+    planted,
+    read_initial,
+)
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.stages import CompiledGeneration
@@ -51,6 +59,7 @@ def train(
     generation: int | None = None,
     evaluator: Evaluator | None = None,
     begin: Callable[[], object] = lambda: None,
+    initial: Initial | None = None,
 ) -> bool:
     """Run or resume the evolution in a run folder; return whether it came to its end.
 
@@ -58,13 +67,18 @@ def train(
       resume: go on from a checkpoint, the latest or that of `generation`.
       evaluator: evaluates the individuals instead of this machine.
       begin: creates the folder of a new run; called after the last check.
+      initial: first individuals of a new run.
 
     Raises:
-      UserError: the physics does not support the creature's model, or another process works on
-        the run.
+      UserError: the physics does not support the creature's model, the first individuals do not
+        fit, or another process works on the run.
     """
     experiment = build_experiment(creature, config)
+    if initial:
+        check_initial(initial, experiment)
     with locked_run(folder, resume, begin):
+        if initial:
+            keep_initial(folder, initial)
         return _train(folder, experiment, screen, resume, generation, evaluator)
 
 
@@ -88,7 +102,7 @@ def _train(
     if prescreen := prescreen_of(experiment):
         prescreen.begin()
     with screen.compiling(creature.name, experiment):
-        generations = _compiled(Batch((experiment,)), evaluator, restored)
+        generations = _compiled(Batch((experiment,)), evaluator, restored, read_initial(folder))
     began = time.perf_counter()
     examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS), prescreen)
     try:
@@ -129,15 +143,25 @@ def mend_champion(folder: Path, experiment: Experiment, state: EvolutionState) -
 
 
 def _compiled(
-    run: Batch, evaluator: Evaluator | None, restored: EvolutionState | None
+    run: Batch,
+    evaluator: Evaluator | None,
+    restored: EvolutionState | None,
+    initial: Genomes | None,
 ) -> Generations:
     """Return the generations of one run, from the restored or the first state.
 
     The first state has its own program. It is compiled in parallel, because the compiler uses one
     core in its first seconds on the large program.
     """
+
+    def begun() -> EvolutionState:
+        if restored is not None:
+            return one_row(restored)
+        drawn = run.experiments[0].init()
+        return one_row(drawn if initial is None else planted(drawn, initial))
+
     with ThreadPoolExecutor(1) as aside:
-        first = aside.submit(run.init if restored is None else lambda: one_row(restored))
+        first = aside.submit(begun)
         return Generations(_step(run, evaluator), run, first.result())
 
 

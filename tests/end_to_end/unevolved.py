@@ -24,7 +24,7 @@ from mjxgait.training.prescreen import Prescreen
 
 
 def unevolved(
-    run: Batch, evaluator: Evaluator | None, restored: EvolutionState | None
+    run: Batch, evaluator: Evaluator | None, restored: EvolutionState | None, initial: object
 ) -> Generations:
     """Stand in for `loop._compiled`: the first population stays, and no program is compiled.
 

@@ -1,0 +1,148 @@
+"""The last population of an earlier run as the first of a new one.
+
+The new run keeps it in its folder, so that it begins again without the earlier run.
+"""
+
+import dataclasses
+import io
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.evolution.state import EvolutionState
+from mjxgait.files import DamagedFile, read_bytes, write_bytes
+from mjxgait.training.experiment import Experiment, arrays_of, build_experiment
+from mjxgait.training.folder import open_run
+from mjxgait.training.stored import disk_errors, read_stored
+
+INITIAL = "initial.npz"
+"""File in a run folder: the arrays [N, ...] of these genomes by dotted name."""
+GENOMES = "genomes."
+MOST = 1_000_000_000
+"""Largest size of the file in bytes."""
+
+Genomes = Mapping[str, np.ndarray]
+
+
+@dataclasses.dataclass(frozen=True)
+class Initial:
+    """Genomes of a run's last checkpoint, best first, without those that have no fitness.
+
+    Attributes:
+      source: folder of that run. controller, reads: its controller and what that observes. joints:
+        names of the body's joints; empty for bodies that grow.
+    """
+
+    source: Path
+    controller: str
+    reads: tuple[str, ...]
+    joints: tuple[str, ...]
+    genomes: Genomes
+
+
+def initial_of(source: Path) -> Initial:
+    """Return the population of a run's latest checkpoint.
+
+    Raises:
+      UserError: no run, no intact checkpoint, or no individual with a fitness.
+    """
+    creature, config = open_run(source)
+    arrays = read_stored(source, creature.digest).arrays
+    alive = np.isfinite(arrays["fitness"])
+    if not alive.any():
+        raise UserError(f"{source}: no individual of its last checkpoint has a fitness")
+    found = {k.removeprefix(GENOMES): v[alive] for k, v in arrays.items() if k.startswith(GENOMES)}
+    reads = tuple(build_experiment(creature, config).simulator.controller.reads)
+    return Initial(source, config.use.controller, reads, _joints(creature), found)
+
+
+def check_initial(initial: Initial, experiment: Experiment) -> None:
+    """Refuse genomes that mean something else in another run, or fit nowhere in it.
+
+    Raises:
+      UserError: names the difference.
+    """
+    controller, use = experiment.simulator.controller, experiment.config.use
+    if initial.controller != use.controller:
+        raise UserError(
+            f"{initial.source}: its controller is {initial.controller}, that of the new run "
+            f"{use.controller}; give the new run --use.controller {initial.controller}"
+        )
+    if initial.joints != _joints(experiment.creature):
+        raise UserError(f"{initial.source}: its body has other joints than the new run's")
+    if initial.joints and set(initial.reads) != set(controller.reads):
+        raise UserError(
+            f"{initial.source}: its controller observes {', '.join(initial.reads)}, that of the "
+            f"new run {', '.join(controller.reads)}"
+        )
+    wanted = _shapes(arrays_of_shapes(experiment))
+    found = _shapes(initial.genomes)
+    for name in sorted(found.keys() | wanted.keys()):
+        if found.get(name) != wanted.get(name):
+            raise UserError(
+                f"{initial.source}: its genomes have {name} of shape {found.get(name, 'none')}, "
+                f"the new run's {wanted.get(name, 'none')}; give the new run the same settings of "
+                "the controller"
+            )
+
+
+def arrays_of_shapes(experiment: Experiment) -> dict[str, jax.ShapeDtypeStruct]:
+    """Return the shapes of a run's genomes by dotted name."""
+    leaves = jax.tree_util.tree_leaves_with_path(experiment.abstract().genomes)
+    return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
+
+
+def keep_initial(folder: Path, initial: Initial) -> None:
+    """Write the genomes into a run folder."""
+    data = io.BytesIO()
+    np.savez_compressed(data, allow_pickle=False, **initial.genomes)
+    with disk_errors(folder):
+        write_bytes(folder / INITIAL, data.getvalue())
+
+
+def read_initial(folder: Path) -> Genomes | None:
+    """Return the genomes that a run began with; None if they were drawn.
+
+    Raises:
+      UserError: the file is damaged.
+    """
+    path = folder / INITIAL
+    if not path.exists():
+        return None
+    try:
+        with np.load(io.BytesIO(read_bytes(path, MOST)), allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise DamagedFile(f"{path}: damaged ({error})") from None
+
+
+def planted(state: EvolutionState, genomes: Genomes) -> EvolutionState:
+    """Replace the first individuals of an unevaluated population [P]; the rest stays drawn.
+
+    Raises:
+      UserError: the genomes have other shapes.
+    """
+    own = arrays_of(state.genomes)
+    if {n: a.shape[1:] for n, a in own.items()} != {n: a.shape[1:] for n, a in genomes.items()}:
+        raise DamagedFile(f"{INITIAL}: its genomes do not fit the settings of this run")
+    count = min(len(state.fitness), *(len(array) for array in genomes.values()))
+    leaves = [
+        jnp.asarray(leaf).at[:count].set(jnp.asarray(genomes[name][:count], leaf.dtype))
+        for name, leaf in own.items()
+    ]
+    made = jax.tree.unflatten(jax.tree.structure(state.genomes), leaves)
+    return dataclasses.replace(state, genomes=made)
+
+
+def _joints(creature: Creature) -> tuple[str, ...]:
+    return () if creature.settings.creature.grows else tuple(creature.joints.names)
+
+
+def _shapes(arrays: Mapping[str, np.ndarray | jax.ShapeDtypeStruct]) -> dict[str, tuple[int, ...]]:
+    return {name: tuple(array.shape[1:]) for name, array in arrays.items()}
