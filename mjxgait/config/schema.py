@@ -7,6 +7,7 @@ import pydantic
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.tables import (
+    ADDED,
     HOST,
     KIND,
     SHAPE,
@@ -98,7 +99,7 @@ class RolloutConfig:
     promote: Annotated[Share, SHAPE] = 0.25
     step: Annotated[NonNegative, SHAPE] = 0.0
     variety: Annotated[Count, SHAPE] = 1
-    hold: Count = 1
+    hold: Annotated[Count, ADDED] = 1
     joint_noise: NonNegative = 0.1
     velocity_noise: NonNegative = 0.3
     friction: tuple[Positive, Positive] = (0.8, 1.2)

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import pydantic
 import tomli_w
@@ -49,6 +49,9 @@ KIND = "kind"
 
 HOST = "host"
 """Marks a setting that only the host reads, never the compiled program."""
+
+ADDED = "added"
+"""Marks a setting that older run folders lack; its default says what those runs did."""
 
 MOST_TOML = 8_000_000
 """Size limit of a file, bytes."""
@@ -138,26 +141,42 @@ def check(cls: type, document: object, where: str, cure: str) -> None:
 def check_whole(value: "DataclassInstance", table: Table, where: str) -> None:
     """Refuse a table that lacks keys which `dump_toml` writes for the dataclass read from it.
 
+    Keys that are marked `ADDED` may be missing.
+
     Raises:
       UserError: names the first.
     """
-    if missing := _missing(_without_none(dataclasses.asdict(value)), table):
+    if missing := _missing(_without_none(dataclasses.asdict(value)), table, added_in(type(value))):
         raise UserError(
             f'{where}: the key "{missing}" is missing, and what a default would put in its place is '
             "not what was meant; write it there again, or take the whole folder from a copy"
         )
 
 
-def _missing(wanted: Table, table: Table, prefix: str = "") -> str | None:
-    """Return the first key, dotted, that a table lacks; None where it has all."""
+def _missing(wanted: Table, table: Table, added: frozenset[str], prefix: str = "") -> str | None:
+    """Return the first key, dotted, that a table lacks; None where it has all but those added."""
     for key, value in wanted.items():
         if key not in table:
-            return prefix + key
-        if isinstance(value, Mapping) and isinstance(table[key], Mapping):
-            found = _missing(value, table[key], f"{prefix}{key}.")
-            if found:
-                return found
+            if prefix + key not in added:
+                return prefix + key
+            continue
+        inner = table[key]
+        if not isinstance(value, Mapping) or not isinstance(inner, Mapping):
+            continue
+        if found := _missing(value, inner, added, f"{prefix}{key}."):
+            return found
     return None
+
+
+def added_in(cls: type, prefix: str = "") -> frozenset[str]:
+    """Return the dotted keys of a schema that are marked `ADDED`."""
+    found: set[str] = set()
+    for name, hint in get_type_hints(cls, include_extras=True).items():
+        if ADDED in getattr(hint, "__metadata__", ()):
+            found.add(prefix + name)
+        elif dataclasses.is_dataclass(hint) and isinstance(hint, type):
+            found |= added_in(hint, f"{prefix}{name}.")
+    return frozenset(found)
 
 
 @cache
