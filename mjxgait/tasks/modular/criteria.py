@@ -19,7 +19,7 @@ from mjxgait.certification.criteria import (
     joint_overrun,
     steady,
 )
-from mjxgait.certification.describe import worst_overlap
+from mjxgait.certification.describe import vibration, worst_overlap
 from mjxgait.champion import Champion
 from mjxgait.controllers.sims_brain.reference_body import DRAG
 from mjxgait.creature import Creature
@@ -295,14 +295,22 @@ class RoamCriteria(GoingCriteria):
     verdict = "it walks"
     verb = "walks"
     axes = 2
+    revision = 2
+    """Criterion 7 was added."""
 
     @override
     def wanted(self, config: CertificateConfig) -> RoamConfig:
         return config.roam
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """Evaluate criterion 1: the side that was up after settling stays up."""
-        return (balanced(window, config.roam),)
+        """Evaluate criteria 1 and 7."""
+        return on_land(window, config)
+
+
+def on_land(window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+    """Evaluate the criteria of walking alone: 1, and 7, no motion by vibration."""
+    gait = Criterion(7, "gait", (vibration(window, config.gait),))
+    return (balanced(window, config.roam), gait)
 
 
 def balanced(window: Recording, config: RoamConfig) -> Criterion:

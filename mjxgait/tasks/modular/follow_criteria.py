@@ -12,7 +12,8 @@ from mjxgait.controllers.sims_brain.reference_body import DRAG, LIGHT
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import Starts
-from mjxgait.tasks.modular.criteria import ModularCriteria, balanced, by_water, counted, seen
+from mjxgait.tasks.modular.criteria import ModularCriteria, by_water, counted, seen
+from mjxgait.tasks.modular.criteria import on_land as walks
 from mjxgait.tasks.modular.thresholds import FollowConfig
 
 
@@ -25,6 +26,7 @@ class FollowCriteria(ModularCriteria):
 
     def __init__(self, drag: float) -> None:
         self.drag = drag
+        self.revision = 1 if drag else 2
         self.axes = 3 if drag else 2
 
     @override
@@ -40,7 +42,7 @@ class FollowCriteria(ModularCriteria):
         """The criterion of swimming or of walking."""
         if self.drag:
             return (by_water(window, config.swim),)
-        return (balanced(window, config.roam),)
+        return walks(window, config)
 
     def done(self, window: Recording) -> float:
         """Speed of the approach in m/s."""
