@@ -264,7 +264,7 @@ class AdvanceIsland(Job[Advanced]):
 class Evaluate(Job[Evaluation]):
     """Evaluate genomes [1, N, ...] on starts [1, R], with leaves in NumPy.
 
-    asked: see `Evaluator`.
+    requested: see `Evaluator`.
     """
 
     genomes: object

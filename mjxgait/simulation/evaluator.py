@@ -27,7 +27,7 @@ class Evaluator(Protocol):
     ) -> Evaluation:
         """Return the results, leaves [B, N, ...], of genomes [B, N, ...] in the trials [B, R].
 
-        settings: traced, leaves [B, ...]. asked: the trials to run; None is all.
+        settings: traced, leaves [B, ...]. requested: the trials to run; None is all.
         """
         ...
 

@@ -30,8 +30,7 @@ class Starts:
     qpos: [R, nq]. qvel: [R, nv]. friction: [R] factor on the floor's friction.
     push: [R, nv] added to qvel at step push_step [R] (never when it is `NEVER`).
     stiffness, damping: [R, J] factors on the joints' kp and kd.
-    heaviness: [R, nbody - 1] mass scales, factors on the parts' masses and inertias; None if all
-      are 1.
+    mass_scale: [R, nbody - 1] factors on the parts' masses and inertias; None if all are 1.
     numbers: leaves [R, ...], the body parameters that follow from it, as the plant reads them.
     ground: leaves [R, ...], one per trial; None if all are flat.
     goal: leaves [R, ...], what the task adds to a trial, as its `Task.goal` reads it; None if it

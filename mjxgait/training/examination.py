@@ -116,8 +116,7 @@ class Examiner:
     Attributes:
       versions: package versions, for the champions. tell: called with a message before each step.
       exams: the run's examinations so far. Each is an attempt; the certificate states its number.
-      tryout: pre-screening that ranks the candidates before validation; None keeps the order by
-        fitness.
+      prescreen: ranks the candidates before validation; None keeps the order by fitness.
     """
 
     experiment: Experiment

@@ -274,7 +274,7 @@ def build_batch(
     """Build runs of one creature with configs that share one program.
 
     Args:
-      blueprint: of this creature, with settings of the same shape; made here by default.
+      spec: of this creature, with settings of the same shape; made here by default.
       sources: for each run, the runs whose best are evaluated among its children; none by default.
 
     Raises:
