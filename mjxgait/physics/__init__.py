@@ -22,13 +22,13 @@ SLOWER = "15 to 30"
 
 
 def make_plant(
-    creature: Creature, physics: Physics, touch_ends: bool, roomy: bool = False
+    creature: Creature, physics: Physics, touch_ends: bool, padded: bool = False
 ) -> tuple[ModelPlant, int]:
     """Return the plant of a creature, and a suitable number of lanes per device.
 
     Args:
       touch_ends: whether an episode ends when a part touches the floor that must not.
-      roomy: whether the program must also serve bodies with other shapes.
+      padded: whether the program must also serve bodies with other shapes.
 
     Raises:
       UserError: MJX does not support something in the model; the message quotes MJX.
@@ -38,7 +38,7 @@ def make_plant(
     note = ""
     if physics == "auto":
         try:
-            return fast_plant(model, layout, crossings, roomy), 64
+            return fast_plant(model, layout, crossings, padded), 64
         except UnsupportedModel as reason:
             note = _cost(reason)
     # MJX and the geometry package that it needs take half a second to import.

@@ -296,5 +296,5 @@ def _of_model(creature: Creature, config: Config) -> ModelSpec:
     creature = creature.spanned(config.evolution.pose_span)
     touch = what_ends(creature, config.rollout).touch
     inputs = config.rollout.body == "inputs"
-    plant, lanes = make_plant(creature, config.rollout.physics, touch, roomy=inputs)
+    plant, lanes = make_plant(creature, config.rollout.physics, touch, padded=inputs)
     return ModelSpec(creature, config, plant, lanes, growth_of(creature, config))

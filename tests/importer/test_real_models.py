@@ -139,7 +139,7 @@ def test_robot_dogs_share_one_program():
     def topology(name: str) -> Topology:
         creature = load_files(imported_model(name).files)
         known = (creature.evolution_model, observation_layout(creature), find_crossings(creature))
-        return fast_plant(*known, roomy=True).topology
+        return fast_plant(*known, padded=True).topology
 
     first, *others = (topology(name) for name in DOGS)
     for name, other in zip(DOGS[1:], others, strict=True):

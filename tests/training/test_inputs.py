@@ -80,18 +80,18 @@ def test_a_shape_more_needs_no_program_of_its_own(stools: str, stool: Creature, 
 def test_padding_does_not_change_results(tmp_path: Path):
     creature = saddled(shutil.copytree(STOOL, tmp_path / "other"))
     known = (creature.evolution_model, observation_layout(creature), find_crossings(creature))
-    tight, roomy = fast_plant(*known), fast_plant(*known, roomy=True)
+    tight, padded = fast_plant(*known), fast_plant(*known, padded=True)
     rng, lanes = np.random.default_rng(0), 8
     qpos = np.tile(creature.stand_qpos[:, None], lanes)
     qpos[creature.joints.qpos_adr] += rng.normal(size=(len(creature.joints.qpos_adr), lanes))
     qpos[2] += np.linspace(-0.3, 0.1, lanes)
     zero = np.zeros((creature.nv, lanes))
     state = BodyState(*map(np.float32, (qpos, zero, zero, zero, np.ones(lanes))))
-    depths = [np.asarray(jax.jit(plant.overlap)(state)) for plant in (tight, roomy)]
+    depths = [np.asarray(jax.jit(plant.overlap)(state)) for plant in (tight, padded)]
     np.testing.assert_allclose(depths[0], depths[1], atol=1e-6)
     assert np.ptp(depths[0]) > 1e-3
     # Only this part of a step is compiled.
-    lowest = [jax.jit(lambda at, p=plant: p.forward(at)[0].geom_low) for plant in (tight, roomy)]
+    lowest = [jax.jit(lambda at, p=plant: p.forward(at)[0].geom_low) for plant in (tight, padded)]
     seen = [np.asarray(one(state)) for one in lowest]
     feet = len(creature.feet.foot_of)
     np.testing.assert_allclose(seen[0][:feet], seen[1][:feet], atol=1e-6)

@@ -28,10 +28,10 @@ FAR = 1e3
 def make_room(topology: Topology, parameters: Parameters, feet: int) -> tuple[Topology, Parameters]:
     """Pad a body with places. feet: number of first watched shapes that stay as they are."""
     slots, rows = _places(topology, feet)
-    roomy = dataclasses.replace(
+    padded = dataclasses.replace(
         topology, watched=slots, bar_body=(), first=(), second=(), open_pairs=True
     )
-    return roomy, dataclasses.replace(
+    return padded, dataclasses.replace(
         parameters,
         watched=_watched(parameters.watched, rows),
         bars=_bars(topology, parameters.bars),

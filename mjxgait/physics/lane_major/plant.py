@@ -99,7 +99,7 @@ class FastPlant:
     ) -> Parameters:
         """See `Plant.parameters_of`."""
         try:
-            other = fast_plant(model, layout, crossings, roomy=self.topology.open_pairs)
+            other = fast_plant(model, layout, crossings, padded=self.topology.open_pairs)
             told = difference(self.topology, other.topology)
         except UnsupportedModel as reason:
             told = f"the fast physics does not know this: {reason}"
@@ -342,18 +342,18 @@ def fast_plant(
     model: mujoco.MjModel,
     layout: ObservationLayout,
     crossings: Crossings | None = None,
-    roomy: bool = False,
+    padded: bool = False,
 ) -> FastPlant:
     """Make a plant for a model that the lane-major physics supports.
 
     Args:
-      roomy: with spare places, so that bodies with other shapes share its program.
+      padded: with spare places, so that bodies with other shapes share its program.
 
     Raises:
       UnsupportedModel: the model is not supported; the message says why.
     """
     seen = fuse(model, layout, crossings)
     topology, parameters = read_topology(*seen), read_parameters(*seen)
-    if roomy:
+    if padded:
         topology, parameters = make_room(topology, parameters, layout.feet)
     return FastPlant(topology, parameters)

@@ -46,7 +46,7 @@ class Topology:
     bar_body: [S], first, second: [Q]; see `Crossings`.
     step: s. iterations, line_iterations: maxima of Newton's method and its line search.
     warm_start: whether the solver starts from the previous step's solution.
-    water: whether a fluid resists. open_pairs: whether bars and pairs are numbers (`roomy`).
+    water: whether a fluid resists. open_pairs: whether bars and pairs are numbers (`padded`).
     names: of the bodies, for messages only. moving: [B] their indices in the model.
     welded: whether they carry others.
     """
