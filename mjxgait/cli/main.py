@@ -1,6 +1,7 @@
 """The command line: `mjxgait SUBCOMMAND`; `scripts/*.py` are thin wrappers around it."""
 
 import importlib
+import importlib.metadata
 import keyword
 import os
 import shlex
@@ -48,7 +49,7 @@ Evolve a stable walk for any creature.
 
 {commands}
 
-`mjxgait SUBCOMMAND --help` lists the options of each."""
+`mjxgait SUBCOMMAND --help` lists the options of each; `mjxgait --version` says which this is."""
 
 
 def _with_own_parts(given: Sequence[str]) -> list[str]:
@@ -91,6 +92,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             )
         )
         sys.exit(0 if given else 2)
+    if given[0] in ("-V", "--version"):
+        print(f"mjxgait {importlib.metadata.version('mjxgait')}")
+        sys.exit(0)
     try:
         if given[0] in MOVED:
             raise UserError(MOVED[given[0]])

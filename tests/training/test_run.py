@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -426,6 +427,7 @@ def test_help_reads_well(capsys: pytest.CaptureFixture):
     text = said_by(capsys, "train", "--help", code=0)
     assert "--evolution.population" in text
     assert "--seed" in text
+    assert said_by(capsys, "--version", code=0).split() == ["mjxgait", version("mjxgait")]
 
 
 def test_the_train_script_runs_the_command(tmp_path: Path):

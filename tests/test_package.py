@@ -1,0 +1,65 @@
+"""The package that is released: it has one version and every file that a checkout has."""
+
+import re
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import mjxgait
+
+ROOT = Path(__file__).parents[1]
+SHIPPED = {"mjxgait": "mjxgait", "envs": "mjxgait/data/envs", "configs": "mjxgait/data/configs"}
+"""Folders of the checkout, and where each lies in a wheel."""
+
+
+def files(folder: str) -> set[str]:
+    """Return the paths within a folder of the checkout, without compiled Python."""
+    paths = (path for path in (ROOT / folder).rglob("*") if path.is_file())
+    return {path.relative_to(ROOT / folder).as_posix() for path in paths if path.suffix != ".pyc"}
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build both without isolation, so that nothing is fetched."""
+    pytest.importorskip("hatchling", reason="needs hatchling, of the extra `test`")
+    folder = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-P", "-m", "hatchling", "build", "--directory", str(folder)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    return folder
+
+
+def test_a_wheel_has_every_creature_config_and_page(built: Path):
+    (wheel,) = built.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if ".dist-info/" not in name}
+    expected = {f"{place}/{path}" for folder, place in SHIPPED.items() for path in files(folder)}
+    assert names == expected
+    for path in (
+        "data/envs/crab/creature.xml",
+        "data/configs/default.toml",
+        "web/assets/page.html",
+    ):
+        assert f"mjxgait/{path}" in names
+
+
+def test_a_source_archive_can_be_tested_and_built_again(built: Path):
+    (archive,) = built.glob("*.tar.gz")
+    with tarfile.open(archive) as opened:
+        names = {name.partition("/")[2] for name in opened.getnames()}
+    for folder in (*SHIPPED, "tests"):
+        assert {f"{folder}/{path}" for path in files(folder)} <= names, folder
+    assert {"pyproject.toml", "constraints.txt", "README.md", "LICENSE"} <= names
+
+
+def test_the_version_stands_in_one_place(built: Path):
+    (wheel,) = built.glob("*.whl")
+    assert wheel.name.split("-")[1] == mjxgait.__version__
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["dynamic"] == ["version"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert not re.search(r"^version:", citation, re.M)
