@@ -63,3 +63,12 @@ def test_the_version_stands_in_one_place(built: Path):
     assert project["dynamic"] == ["version"]
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert not re.search(r"^version:", citation, re.M)
+
+
+def test_the_changelog_keeps_its_form():
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^## (\[Unreleased\]|\[\d+\.\d+\.\d+\] - \d{4}-\d\d-\d\d)$", text, re.M)
+    assert len(blocks) == text.count("\n## ")
+    assert blocks[0] == "[Unreleased]" or blocks[0].startswith(f"[{mjxgait.__version__}]")
+    sections = {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+    assert set(re.findall(r"^### (.+)$", text, re.M)) <= sections
