@@ -72,3 +72,29 @@ def test_the_changelog_keeps_its_form():
     assert blocks[0] == "[Unreleased]" or blocks[0].startswith(f"[{mjxgait.__version__}]")
     sections = {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
     assert set(re.findall(r"^### (.+)$", text, re.M)) <= sections
+
+
+def workflow(name: str) -> dict:
+    """Return a workflow of GitHub."""
+    yaml = pytest.importorskip("yaml")
+    return yaml.safe_load((ROOT / ".github" / "workflows" / name).read_text(encoding="utf-8"))
+
+
+def test_github_runs_what_the_check_runs():
+    steps = workflow("ci.yml")["jobs"]["check"]["steps"]
+    commands = {step["run"] for step in steps if "run" in step}
+    check = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    for command in ("ruff check .", "ruff format --check .", "mypy", "python -m pytest -n 2"):
+        assert command in commands
+        assert re.search(rf"^{re.escape(command)}( &)?$", check, re.M)
+    extra = '--editable ".[test]" --constraint constraints.txt'
+    assert f"uv pip install {extra}" in commands
+    assert extra in check
+
+
+def test_a_release_is_published_without_a_token():
+    jobs = workflow("release.yml")["jobs"]
+    assert jobs["publish"]["permissions"] == {"id-token": "write"}
+    assert jobs["publish"]["needs"] == "build"
+    text = (ROOT / ".github" / "workflows" / "release.yml").read_text(encoding="utf-8")
+    assert "secrets." not in text
