@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+import mjxgait
+
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted([*DOCS.rglob("*.md"), *ROOT.glob("*.md")])
@@ -30,6 +32,26 @@ def test_every_page_is_found_from_the_index():
     index = (DOCS / "README.md").read_text(encoding="utf-8")
     linked = {(DOCS / path).resolve() for path, _ in LINK.findall(index) if path}
     assert {page for page in DOCS.rglob("*.md") if page.name != "README.md"} <= linked
+
+
+def test_every_page_is_in_the_navigation_of_the_site():
+    """The site itself is built by `mkdocs build --strict`, outside of these tests."""
+    site = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    listed = re.findall(r"^ +- (?:[^:#]+: )?(\S+\.md)$", site, re.M)
+    assert len(listed) == len(set(listed))
+    assert set(listed) == {page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")}
+
+
+def test_no_page_links_out_of_the_site():
+    """GitHub would follow such a link; the site has no target for it."""
+    for page in DOCS.rglob("*.md"):
+        for path, _ in LINK.findall(page.read_text(encoding="utf-8")):
+            assert (page.parent / path).resolve().is_relative_to(DOCS), f"{page.name}: {path}"
+
+
+def test_the_page_about_python_shows_every_public_name():
+    page = (DOCS / "reference" / "api.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^::: mjxgait\.(\w+)$", page, re.M)) == sorted(mjxgait.__all__)
 
 
 @pytest.mark.parametrize("folder", ["mjxgait", "scripts", "benchmarks", "configs", "envs", "tests"])

@@ -81,20 +81,25 @@ def train(
     Does the same as `mjxgait train`, without plots: the same settings give the same champion.
 
     Args:
-      env: shipped creature, creature folder, or model file. out: the run folder, which must be
-        empty or new; by default a new one under runs/.
+      env: shipped creature, creature folder, or model file.
+      out: the run folder, which must be empty or new; by default a new one under runs/.
       config: file with settings, or the name of a shipped config such as wilson.
-      controller, task: a shipped name, or FILE.py:CLASS of your own (docs/guide/your-own-task.md).
+      controller: a shipped name, or FILE.py:CLASS of your own (docs/guide/your-own-task.md).
+      task: a shipped name, or FILE.py:CLASS of your own.
       scale: size factors of parts, such as {"*_shin": 1.2} (docs/reference/creature-folder.md).
-      way: forward, back, left or right: direction in the creature's own frame
-        (docs/guide/gaits.md). speed, gait, turn, steer, style: walk targets (docs/guide/gaits.md):
-        m/s or text such as
-        "0.4bl/s", a name, deg/s to the left, deg/s to either side, a name or a file.
+      way: forward, back, left or right: direction in the creature's own frame.
+      speed: target in m/s, or text such as "0.4bl/s" (all targets: docs/guide/gaits.md).
+      gait: name of the gait that is asked for.
+      turn: degrees per second to the left.
+      steer: degrees per second to either side.
+      style: name of a shipped style, or a file.
       certificate: walks, or anywhere (docs/reference/certificate.md).
       expressions: file of initial programs, for the controller program
         (docs/reference/expressions.md).
-      source: an earlier run; its last population is the first of this one. seed, population, generations: the settings that are
-        changed most often.
+      source: an earlier run; its last population is the first of this one.
+      seed: of all random numbers.
+      population: individuals of a generation.
+      generations: the most that are evolved.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
       quiet: prints nothing.
 
@@ -151,14 +156,23 @@ def refine(
     Does the same as `mjxgait refine`; `Run.departure` reports what physics changed.
 
     Args:
-      env: as for `train`. keys: file with the cycle: GLB, BVH, CSV or JSON. out: as for `train`.
+      env: as for `train`.
+      keys: file with the cycle: GLB, BVH, CSV or JSON.
+      out: as for `train`.
       keep: 1 fixes the poses, 0 lets each joint depart by 30 degrees and the period by 30 %.
       names: name in the file by part (CSV or JSON: joint), or a TOML file of these, where the
         guess is wrong.
-      begin, end: s, of the cycle in the file. tolerance: degrees, largest root mean square error of
-        the key poses. forward: z, -z, x or -x, the facing direction in the file, Y up; by default
-        z, or as in the rig that the creature was imported from.
-      config, seed, population, generations, settings, quiet: as for `train`.
+      begin: s; start of the cycle in the file.
+      end: s; its end.
+      tolerance: degrees, largest root mean square error of the key poses.
+      forward: z, -z, x or -x, the facing direction in the file, Y up; by default z, or as in the
+        rig that the creature was imported from.
+      config: as for `train`.
+      seed: as for `train`.
+      population: as for `train`.
+      generations: as for `train`.
+      settings: as for `train`.
+      quiet: as for `train`.
 
     Raises:
       UserError: an invalid argument or file, explained in one sentence.

@@ -28,7 +28,11 @@ Place = str | Path
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """A run folder. folder: its path (contents: see the README)."""
+    """A run folder.
+
+    Attributes:
+      folder: its path.
+    """
 
     folder: Path
 
