@@ -1,6 +1,7 @@
 """The package that is released: it has one version and every file that a checkout has."""
 
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -53,7 +54,21 @@ def test_a_source_archive_can_be_tested_and_built_again(built: Path):
         names = {name.partition("/")[2] for name in opened.getnames()}
     for folder in (*SHIPPED, "tests"):
         assert {f"{folder}/{path}" for path in files(folder)} <= names, folder
-    assert {"pyproject.toml", "constraints.txt", "README.md", "LICENSE"} <= names
+    assert {"pyproject.toml", "constraints.txt", "README.md", "LICENSE", ".ci/run"} <= names
+
+
+def test_what_else_lies_in_a_checkout_is_not_released(tmp_path: Path):
+    builder = pytest.importorskip("hatchling.builders.sdist", reason="needs hatchling")
+    for folder in ("mjxgait", "runs", "shared"):
+        (tmp_path / folder).mkdir()
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    for path in ("README.md", "LICENSE", "notes.txt", "runs/champion.json", "shared/data.json"):
+        (tmp_path / path).write_text("")
+    shutil.copy(ROOT / "mjxgait" / "__init__.py", tmp_path / "mjxgait")
+    (built,) = builder.SdistBuilder(str(tmp_path)).build(directory=str(tmp_path / "dist"))
+    with tarfile.open(built) as opened:
+        names = {name.partition("/")[2] for name in opened.getnames()}
+    assert names == {"mjxgait/__init__.py", "pyproject.toml", "README.md", "LICENSE", "PKG-INFO"}
 
 
 def test_the_version_stands_in_one_place(built: Path):
