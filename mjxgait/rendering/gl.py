@@ -102,12 +102,8 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
     cameras = [stage.camera(frame) for frame in frames]
     first = cameras[0]
     into = first.axes[2]
-    place = creature.root_qpos
     times = [frame * stage.time_step for frame in frames]
-    poses = np.array(
-        [[one.walk.qpos[one.frame(time)] for one in stage.participants] for time in times]
-    )
-    poses[..., place : place + 3] += stage.lanes
+    poses = np.array([stage.root_poses(time) for time in times])
     numbers = {
         int(n) for camera in (first, cameras[-1]) for n in band_lines(camera, stage.origin)[0]
     }

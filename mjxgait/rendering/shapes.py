@@ -27,14 +27,15 @@ class Silhouettes:
         self.ellipsoid = np.array([p[2] for p in parts])[:, None]
 
     def outermost(self, pos: np.ndarray, rot: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Return the outermost points [G, K, 3] m of geoms at pos [G, 3] and rot [G, 3, 3] along
-        unit directions [K, 3].
+        """Return the outermost points [..., G, K, 3] m of geoms along unit directions [K, 3].
+
+        pos: [..., G, 3] m. rot: [..., G, 3, 3].
         """
         local = directions @ rot
         stretched = local * self.ellipsoid
-        length = np.maximum(np.linalg.norm(stretched, axis=2, keepdims=True), 1e-12)
+        length = np.maximum(np.linalg.norm(stretched, axis=-1, keepdims=True), 1e-12)
         inner = np.sign(local) * self.box + stretched * self.ellipsoid / length
-        return pos[:, None] + self.ball * directions + inner @ rot.transpose(0, 2, 1)
+        return pos[..., None, :] + self.ball * directions + inner @ rot.swapaxes(-1, -2)
 
 
 def hit(

@@ -4,7 +4,9 @@ Letters: `G` geoms.
 """
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 
+import mujoco
 import numpy as np
 from PIL import Image
 
@@ -25,7 +27,10 @@ class Participant:
     """
 
     def __init__(self, walk: Walk, origin: np.ndarray, forward: np.ndarray) -> None:
-        """Scene's start, origin [2] m, and direction of travel, forward [2] unit."""
+        """Scene's start, origin [2] m, and direction of travel, forward [2] unit.
+
+        All go that way: the scene turns each walk about its start.
+        """
         self.walk, self.origin = walk, origin
         self.start, self.step = walk.trunk_pos[0, :2], walk.time_step
         ahead, left = walk.forward @ forward, _left(walk.forward) @ forward
@@ -50,25 +55,67 @@ class Participant:
         pos, rot = self.walk.geom_poses(np.array([self.frame(time)]))
         return self.placed(pos[0]), self.turn @ rot[0]
 
+    def turned_pose(self, time: float, lane: np.ndarray) -> np.ndarray:
+        """Return the pose [nq] in the scene, moved by lane [3] m, at s since the start."""
+        qpos, place = self.walk.qpos[self.frame(time)].copy(), self.walk.creature.root_qpos
+        qpos[place : place + 3] = self.placed(qpos[place : place + 3]) + lane
+        turn, before = np.zeros(4), qpos[place + 3 : place + 7].copy()
+        mujoco.mju_mat2Quat(turn, self.turn.ravel())
+        mujoco.mju_mulQuat(qpos[place + 3 : place + 7], turn, before)
+        return qpos
+
+    def reach(self, times: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """Return how far [T, K] m the creature reaches along unit directions [K, 3] of the scene.
+
+        times: [T] s since the start. From the scene's origin; goals and bar do not count.
+        """
+        frames, (pos, rot) = [self.frame(time) for time in times], self._motion
+        points = self.outlines.outermost(pos, rot, directions)
+        reached: np.ndarray = (points * directions).sum(-1).max(1)[frames]
+        return reached
+
+    @cached_property
+    def middle(self) -> np.ndarray:
+        """Middle [frames of the walk, 3] m in the scene, which the camera follows.
+
+        It is the trunk's; of a body that grew the mean of its blocks, for the root may be its tip.
+        """
+        if self.walk.grown:
+            mean: np.ndarray = self._motion[0].mean(1)
+            return mean
+        return self.placed(self.walk.trunk_pos)
+
+    @cached_property
+    def _motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [frames, own, 3] m and rotations [frames, own, 3, 3] of the own geoms."""
+        pos, rot = self.walk.geom_poses(np.arange(len(self.walk.qpos)))
+        return self.placed(pos[:, self.own]), self.turn @ rot[:, self.own]
+
     def ground_heights(self, places: np.ndarray) -> np.ndarray:
         """Return the ground heights [n] m at places [n, 2] m of the scene."""
         own = (places - self.origin) @ self.turn[:2, :2] + self.start
         return self.walk.ground_heights(own)
 
     def _measure(self, forward: np.ndarray) -> None:
-        model = self.walk.creature.model
-        own = self.painter.geoms[self.painter.geoms < model.ngeom]
+        model, own = self.walk.shown, self._own_geoms()
+        self.own, self.outlines = own, Silhouettes(model, own)
         pos, rot = (poses[own] for poses in self.poses(0.0))
         left = np.cross(UP, forward)
         side = pos @ left - (pos @ left).mean()
         far = np.clip(side / max(float(np.abs(side).max()), 1e-6), 0.0, 1.0)
         self.painter.far[: len(own)] = far
         flat = np.column_stack([COMPASS, np.zeros(len(COMPASS))])
-        outline = Silhouettes(model, own).outermost(pos, rot, np.concatenate([flat, [UP, -UP]]))
+        outline = self.outlines.outermost(pos, rot, np.concatenate([flat, [UP, -UP]]))
         self.outline = outline.reshape(-1, 3)
         self.across, self.along = np.ptp(self.outline @ left), np.ptp(self.outline @ forward)
         self.top = float(self.outline[:, 2].max())
         self.back = float(((self.outline[:, :2] - self.origin) @ forward[:2]).min())
+
+    def _own_geoms(self) -> np.ndarray:
+        """Visible geoms of the creature: goals and bar are bodies behind its own."""
+        geoms = self.painter.geoms
+        own = self.walk.shown.geom_bodyid[geoms] < self.walk.creature.model.nbody
+        return geoms[own]
 
 
 def _left(forward: np.ndarray) -> np.ndarray:
@@ -84,6 +131,14 @@ LAG = 0.15
 """Distance of a race's leader from the middle, as a share of the picture's width."""
 SMOOTH_SECONDS = 0.6
 """Averaging window of the camera's path, so that it does not shake with each step."""
+
+
+MARGINS = np.array([0.03, 0.03, 0.06, 0.10])
+"""Least distance of a body from the picture's edges (right, left, upper, lower), as a share of the
+picture; captions stand above, numbers below.
+"""
+LEAST_SCALE = 0.05
+"""Smallest scale in units of the usual one: a body that flies apart is not shown as a dot."""
 
 
 class Stage:
@@ -119,6 +174,11 @@ class Stage:
             pos, rot = participant.poses(frame * self.time_step)
             shown.append((participant.painter, pos + lane, rot))
         return paint(self.camera(frame), shown, self.origin, self.relief)
+
+    def root_poses(self, time: float) -> np.ndarray:
+        """Return poses [lanes, nq] of walks that are alike, each in its lane; time: s."""
+        pairs = zip(self.participants, self.lanes, strict=True)
+        return np.array([one.turned_pose(time, lane) for one, lane in pairs])
 
     def pictures(self, frames: Sequence[int]) -> Iterator[Image.Image]:
         """Draw several frames."""
@@ -191,17 +251,52 @@ class Stage:
             [everyone[..., 0].max(0) - behind, everyone[..., 1].mean(0), everyone[..., 2].mean(0)]
         )
         self.way = smooth(front, round(SMOOTH_SECONDS / self.time_step))
+        self._make_room(everyone)
+
+    def _make_room(self, everyone: np.ndarray) -> None:
+        """Move the camera away, and its middle, if a body leaves the picture in any frame.
+
+        everyone: paths [lanes, frames, 3] m, see `_path`. In a race a body counts as if it were as
+        far as the camera, for those that are left behind leave the picture.
+        """
+        times = np.arange(self.frames) * self.time_step
+        right, up, _ = axes = self.camera(0).axes
+        centre = np.array([self.camera(frame).centre for frame in range(self.frames)]) @ axes.T
+        sides = np.stack([right, -right, up, -up])
+        alone, reach = len(everyone) == 1, np.zeros((len(everyone), self.frames, 4))
+        for place, (one, lane) in enumerate(zip(self.participants, self.lanes, strict=True)):
+            behind = np.zeros((self.frames, 3)) if alone else self._behind_camera(everyone[place])
+            reach[place] = one.reach(times, sides) + (lane + behind) @ sides.T
+        x, y = centre[:, 0], centre[:, 1]
+        # How far a body reaches from the middle of the picture, each way, at the worst moment.
+        most = (reach.max(0) - np.stack([x, -x, y, -y], 1)).max(0)
+        size = np.repeat([self.width, self.height], 2)
+        room = (0.5 - MARGINS) * size
+        if (most * self.scale <= room).all():
+            return
+        fitting = float(((room[::2] + room[1::2]) / (most[::2] + most[1::2])).min())
+        self.scale = min(self.scale, max(fitting, LEAST_SCALE * self.scale))
+        excess = most - room / self.scale
+        off_x, off_y = (excess[::2] - excess[1::2]) / 2
+        self.shift = self.shift + off_x * right + off_y * up
+
+    def _behind_camera(self, path: np.ndarray) -> np.ndarray:
+        """Offset [frames, 3] m from a body's own path [frames, 3] to the camera's."""
+        own = smooth(path, round(SMOOTH_SECONDS / self.time_step))
+        directions = np.stack([np.append(self.forward, 0.0), self.left, UP])
+        offset: np.ndarray = (self.way - own) @ directions
+        return offset
 
     def _path(self, participant: Participant) -> np.ndarray:
-        """Path [frames, 3] m: ahead of the start, to its left, and the ground's height there; for a
+        """Path [frames, 3] m of the middle: ahead of the start, to its left, and the ground's height there; for a
         swimmer its rise instead.
         """
         steps = [participant.frame(frame * self.time_step) for frame in range(self.frames)]
-        trunk = participant.walk.trunk_pos[steps]
-        places = participant.placed(trunk)[:, :2]
+        middle = participant.middle[steps]
+        places = middle[:, :2]
         moved = places - self.origin
         afloat = participant.walk.afloat
-        level = trunk[:, 2] - trunk[0, 2] if afloat else participant.ground_heights(places)
+        level = middle[:, 2] - middle[0, 2] if afloat else participant.ground_heights(places)
         return np.column_stack([moved @ self.forward, moved @ self.left[:2], level])
 
 

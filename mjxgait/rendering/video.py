@@ -95,8 +95,10 @@ def condition(walk: Walk, time: float) -> str:
     before = max(frame - round(1.0 / walk.time_step), 0)
     if frame == before:
         return "0.00 m/s"
-    moved = (walk.trunk_pos[frame] - walk.trunk_pos[before])[:2] @ walk.forward
-    return f"{moved / ((frame - before) * walk.time_step):.2f} m/s"
+    moved = walk.trunk_pos[frame] - walk.trunk_pos[before]
+    # In water there is no level way.
+    way = np.linalg.norm(moved) if walk.afloat else moved[:2] @ walk.forward
+    return f"{way / ((frame - before) * walk.time_step):.2f} m/s"
 
 
 def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:

@@ -81,6 +81,8 @@ def _add(body: mujoco.MjsBody, kind: mujoco.mjtGeom, colour: list[float], **give
 
 WARMUP = 2.0
 """Time for a gait to settle, s; strides are taken from later if there are enough."""
+LEAST_WAY = 0.1
+"""m; a shorter way has no direction."""
 AFTERMATH = 0.7
 """Time shown after a fall, s."""
 
@@ -146,9 +148,20 @@ class Walk:
 
     @cached_property
     def forward(self) -> np.ndarray:
-        """Horizontal unit vector [2] in the world, the creature's initial direction."""
+        """Horizontal unit vector [2] in the world, the creature's initial direction.
+
+        A body that grew has no front: the direction of its whole way counts.
+        """
+        way = (self.trunk_pos[-1] - self.trunk_pos[0])[:2]
+        if self.grown and np.linalg.norm(way) > LEAST_WAY:
+            return way / np.linalg.norm(way)
         axis = (self.creature.frame.stand_rot @ self.creature.frame.forward)[:2]
         return axis / np.linalg.norm(axis)
+
+    @property
+    def grown(self) -> bool:
+        """True if the body grew from a graph of blocks."""
+        return "graph.half" in self.champion.genome
 
     @cached_property
     def trunk_pos(self) -> np.ndarray:

@@ -11,7 +11,7 @@ from io import BytesIO
 from pathlib import Path
 
 from mjxgait import files
-from mjxgait.animation.export import WalkLoop, build_driven, build_glb, walk_loop
+from mjxgait.animation.export import WalkLoop, build_driven, build_glb, viewpoint, walk_loop
 from mjxgait.certification import (
     Verdict,
     criteria_of,
@@ -30,13 +30,15 @@ from mjxgait.rendering.walk import Walk, doubt, record_walk
 from mjxgait.training.folder import CERTIFICATE, METRICS, STRESS, open_champion, read_metrics
 
 RATE = 30
+FARTHEST = 3.0
+"""Largest distance to which a reader can move the camera, in units of the first."""
 CHECK = (
     "This page proves nothing by itself. Whoever has the run folder can have the champion examined "
     "again: <code>mjxgait inspect RUN --verify</code> compares every measure with the certificate "
     "and ends with exit code 0 only if all are equal."
 )
 FAR = 1.7
-"""Camera distance in units of the creature's size."""
+"""Camera distance in units of the creature's size, or farther where a loop needs more room."""
 
 
 def write_page(run: Path, out: Path) -> str:
@@ -75,6 +77,7 @@ def viewer_script() -> str:
 def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
     """Return the text of the page. sections: HTML below the walk."""
     web = resources.files("mjxgait.web") / "assets"
+    target, far = viewpoint(loop, FAR)
     stride = loop.times[-1] / loop.strides
     lead = (
         f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.frame.body_length:.2f} body lengths per "
@@ -85,8 +88,9 @@ def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
         title=html.escape(walk.creature.name.replace("_", " ")),
         lead=html.escape(lead),
         glb=base64.b64encode(build_glb(loop, floor=True)).decode("ascii"),
-        target=f"0m {0.6 * walk.creature.frame.stand_pos[2]:.3f}m 0m",
-        far=f"{FAR * walk.creature.model.stat.extent:.3f}m",
+        target=" ".join(f"{place:.3f}m" for place in target),
+        far=f"{far:.3f}m",
+        farthest=f"{FARTHEST * far:.3f}m",
         frames=len(loop.times) - 1,
         viewer=viewer_script(),
         sections=sections,

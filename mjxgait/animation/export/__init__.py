@@ -18,6 +18,7 @@ from mjxgait.animation.export.loop import (
     walk_take,
 )
 from mjxgait.animation.export.usd import export_usd
+from mjxgait.animation.export.viewpoint import viewpoint
 
 __all__ = [
     "RATES",
@@ -33,6 +34,7 @@ __all__ = [
     "resampled",
     "standing_still",
     "stride_in_phase",
+    "viewpoint",
     "walk_loop",
     "walk_take",
 ]

@@ -1,0 +1,80 @@
+"""Place of a page's camera from which every frame of a loop is in the picture."""
+
+import mujoco
+import numpy as np
+
+from mjxgait.animation.export.loop import WalkLoop
+from mjxgait.animation.export.skeleton import gltf_axes
+from mjxgait.rendering.painter import seen_geoms
+from mjxgait.rendering.shapes import Silhouettes
+
+ORBITS = np.radians([[-62.0, 76.0], [-90.0, 86.0], [0.0, 84.0], [-90.0, 8.0]])
+"""Azimuth and angle from the vertical of the page's views, as in `page.html`."""
+FIELD = np.radians(30.0)
+"""The viewer's vertical angle of view."""
+ASPECT = 1.5
+"""Smallest width over height of the page's picture."""
+AIR = 1.05
+"""Distance of the camera over the smallest one."""
+
+
+def viewpoint(loop: WalkLoop, usual: float) -> tuple[np.ndarray, float]:
+    """Return the point [3] m that the camera looks at, in glTF's axes, and its distance in m.
+
+    usual: distance in units of the creature's size. The camera stands farther away, and looks at
+    the middle of the motion, where some part would leave the picture in one of the page's views.
+    """
+    creature, reach = loop.walk.creature, _Reach(loop)
+    target = np.array([0.0, 0.6 * creature.frame.stand_pos[2], 0.0])
+    far = usual * float(creature.model.stat.extent)
+    if _distance(reach, target) <= far:
+        return target, far
+    ends = reach.along(np.concatenate([np.eye(3), -np.eye(3)]))
+    target = (ends[:3] - ends[3:]) / 2
+    return target, max(far, AIR * _distance(reach, target))
+
+
+def _distance(reach: "_Reach", target: np.ndarray) -> float:
+    """Smallest distance in m from which all views show everything."""
+    needed = []
+    steep = np.tan(FIELD / 2)
+    for azimuth, polar in ORBITS:
+        towards = np.array(
+            [np.sin(polar) * np.sin(azimuth), np.cos(polar), np.sin(polar) * np.cos(azimuth)]
+        )
+        right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
+        up = np.cross(towards, right)
+        # A point is in the picture if it is not beyond the planes through the picture's edges.
+        edges = [
+            s * axis / slope
+            for axis, slope in ((up, steep), (right, ASPECT * steep))
+            for s in (1, -1)
+        ]
+        planes = towards + np.array(edges)
+        needed.append((reach.along(planes) - planes @ target).max())
+    return float(max(needed))
+
+
+class _Reach:
+    """How far the visible surface of a creature reaches in all frames of a loop."""
+
+    def __init__(self, loop: WalkLoop) -> None:
+        model = loop.walk.creature.model
+        geoms, data = seen_geoms(model), mujoco.MjData(model)
+        self.outlines = Silhouettes(model, geoms)
+        self.axes = gltf_axes(loop.walk.forward)
+        where, how = [], []
+        for qpos in loop.qpos:
+            data.qpos[:] = qpos
+            mujoco.mj_kinematics(model, data)
+            where.append(data.geom_xpos[geoms])
+            how.append(data.geom_xmat[geoms].reshape(-1, 3, 3))
+        self.pos, self.rot = np.array(where), np.array(how)
+
+    def along(self, directions: np.ndarray) -> np.ndarray:
+        """Return the largest products [K] of points with directions [K, 3] in glTF's axes."""
+        length = np.linalg.norm(directions, axis=1, keepdims=True)
+        units = directions / length @ self.axes
+        points = self.outlines.outermost(self.pos, self.rot, units)
+        largest: np.ndarray = (points * units).sum(-1).max((0, 1)) * length[:, 0]
+        return largest
