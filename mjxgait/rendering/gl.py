@@ -98,7 +98,7 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
     every frame.
     """
     walk = stage.participants[0].walk
-    spec, creature = walk.marked, walk.creature
+    spec, creature = walk.source, walk.creature
     cameras = [stage.camera(frame) for frame in frames]
     first = cameras[0]
     into = first.axes[2]

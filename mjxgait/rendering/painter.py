@@ -20,10 +20,15 @@ SMOOTH = 2
 LIGHT = TOWARDS_LAMP / np.linalg.norm(TOWARDS_LAMP)
 """Unit vector towards the lamp, as (forward, left, up) of the creature."""
 SHADOW_GREY = 0.30
-OUTLINE = 0.45
+OUTLINE, SOFT_OUTLINE, CREASE = 0.45, 0.62, 0.82
+"""Brightness of the lines between bodies, between soft ones, and between faces of a soft box."""
 HAZE = np.array([224, 226, 228], dtype=np.float32)
 """Colour that parts on the far side fade into, to distinguish left and right limbs."""
 MOST_HAZE = 0.42
+HARD_LIGHT, SOFT_LIGHT = (0.30, 0.52), (0.46, 0.36)
+"""Brightness of the shade and of the lamp; soft bodies show their colours in the shade too."""
+SMOOTH_FACE = 4
+"""Number of the one face of a soft shape that is no box; a box has 1 to 3."""
 COMPASS = np.stack(
     [
         np.cos(np.linspace(0, 2 * np.pi, 28, endpoint=False)),
@@ -38,16 +43,17 @@ SEEN_GROUPS = 3
 class Painter:
     """Data to draw one kind of creature, in any pose and place."""
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, soft: bool = False) -> None:
         """Read geoms, colours and outlines from the model.
 
+        soft: draw softer lines, also along the edges of boxes.
         `far` [G] may be set: 1 for parts on the creature's far side, drawn paler; 0 for near ones.
         """
         self.model = model
         self.geoms = seen_geoms(model)
         self.colours = geom_colours(model)[self.geoms, :3]
         self.outlines = Silhouettes(model, self.geoms)
-        self.far = np.zeros(len(self.geoms))
+        self.far, self.soft = np.zeros(len(self.geoms)), soft
 
     def shadows(self, pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
         """Return the outlines [geoms, points, 3] m that block light from straight above.
@@ -66,7 +72,7 @@ class Painter:
         )
         for i, geom in enumerate(self.geoms):
             body = first + int(self.model.geom_bodyid[geom])
-            paint = _Paint(self.colours[i], float(self.far[i]), body)
+            paint = _Paint(self.colours[i], float(self.far[i]), body, self.soft)
             kind = int(self.model.geom_type[geom])
             if kind == mujoco.mjtGeom.mjGEOM_MESH:
                 fill_mesh(canvas, self.model, int(geom), pos[i], rot[i], paint)
@@ -117,11 +123,12 @@ def _shade_floor(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Paint:
-    """Look of a geom. colour: [3] 0 to 1. far: 0 to 1, see `Painter`. body: id, for outlines."""
+    """Look of a geom. colour: [3] 0 to 1. far, soft: see `Painter`. body: id, for outlines."""
 
     colour: np.ndarray
     far: float
     body: int
+    soft: bool = False
 
 
 class _Canvas:
@@ -131,6 +138,8 @@ class _Canvas:
         self.pixels, self.camera = pixels, camera
         self.depth = np.full(pixels.shape[:2], np.inf)
         self.body = np.full(pixels.shape[:2], -1, dtype=np.int32)
+        self.face = np.zeros(pixels.shape[:2], dtype=np.int8)
+        """Number of a soft body's face from 1; 0 elsewhere."""
         self.light = lamp_direction(camera.forward)
 
     def primitive(
@@ -152,41 +161,60 @@ class _Canvas:
         rays = self.camera.rays(np.arange(x0, x1), np.arange(y0, y1)).reshape(-1, 3)
         distance, normal = hit(kind, size, (rays - pos) @ rot, self.camera.axes[2] @ rot)
         shape = (y1 - y0, x1 - x0)
+        flat = paint.soft and kind == mujoco.mjtGeom.mjGEOM_BOX
         self.cover(
             (slice(y0, y1), slice(x0, x1)),
             distance.reshape(shape),
             (normal @ rot.T).reshape(*shape, 3),
             paint,
+            # A camera sees at most one of two opposite faces.
+            1 + np.abs(normal).argmax(1).reshape(shape) if flat else None,
         )
 
     def cover(
-        self, place: tuple[slice, slice], distance: np.ndarray, normal: np.ndarray, paint: _Paint
+        self,
+        place: tuple[slice, slice],
+        distance: np.ndarray,
+        normal: np.ndarray,
+        paint: _Paint,
+        face: np.ndarray | None = None,
     ) -> None:
         """Paint a rectangle's pixels that are nearer than the present ones.
 
-        distance: [h, w] m; normal: [h, w, 3] in the world.
+        distance: [h, w] m; normal: [h, w, 3] in the world. face: [h, w] numbers of faces, for lines.
         """
         nearer = distance < self.depth[place]
         self.depth[place][nearer] = distance[nearer]
         self.body[place][nearer] = paint.body
+        if paint.soft:
+            self.face[place][nearer] = SMOOTH_FACE if face is None else face[nearer]
         n = normal[nearer]
         # A lamp, the sky above and a little light from the floor.
-        bright = 0.30 + 0.52 * np.maximum(n @ self.light, 0) + 0.20 * (0.5 + 0.5 * n[:, 2])
+        shade, sun = SOFT_LIGHT if paint.soft else HARD_LIGHT
+        bright = shade + sun * np.maximum(n @ self.light, 0) + 0.20 * (0.5 + 0.5 * n[:, 2])
         colour = 255 * np.clip(bright[:, None] * (0.06 + 0.94 * paint.colour), 0, 1)
         self.pixels[place][nearer] = colour + MOST_HAZE * paint.far * (HAZE - colour)
 
     def image(self) -> Image.Image:
-        """Return the picture, with dark lines between bodies."""
-        edge = np.zeros(self.depth.shape, dtype=bool)
-        for axis in (0, 1):
-            here, there = (
-                np.take(self.body, range(a, self.body.shape[axis] - 1 + a), axis) for a in (0, 1)
-            )
-            differs = here != there
-            inner = tuple(slice(None, -1) if i == axis else slice(None) for i in range(2))
-            edge[inner] |= differs
-        self.pixels[edge] *= OUTLINE
+        """Return the picture, with dark lines between bodies and, softer, between faces."""
+        between = _edges(self.body)
+        soft = _edges(self.face > 0) | (self.face > 0)
+        crease = _edges(self.face) & ~between
+        for edge, light in (
+            (between & ~soft, OUTLINE),
+            (between & soft, SOFT_OUTLINE),
+            (crease, CREASE),
+        ):
+            self.pixels[edge] *= light
         return Image.fromarray(self.pixels.astype(np.uint8))
+
+
+def _edges(numbers: np.ndarray) -> np.ndarray:
+    """Mask [height, width] of the pixels whose right or lower neighbour has another number."""
+    edge = np.zeros(numbers.shape, dtype=bool)
+    edge[:-1] |= numbers[:-1] != numbers[1:]
+    edge[:, :-1] |= numbers[:, :-1] != numbers[:, 1:]
+    return edge
 
 
 def lamp_direction(forward: np.ndarray) -> np.ndarray:

@@ -35,7 +35,7 @@ class Participant:
         self.start, self.step = walk.trunk_pos[0, :2], walk.time_step
         ahead, left = walk.forward @ forward, _left(walk.forward) @ forward
         self.turn = np.array([[ahead, -left, 0.0], [left, ahead, 0.0], UP])
-        self.painter = Painter(walk.shown)
+        self.painter = Painter(walk.shown, soft=walk.grown)
         self._measure(np.append(forward, 0.0))
 
     def frame(self, time: float) -> int:
@@ -102,8 +102,10 @@ class Participant:
         pos, rot = (poses[own] for poses in self.poses(0.0))
         left = np.cross(UP, forward)
         side = pos @ left - (pos @ left).mean()
-        far = np.clip(side / max(float(np.abs(side).max()), 1e-6), 0.0, 1.0)
-        self.painter.far[: len(own)] = far
+        if not self.walk.grown:
+            # The parts of a body that grew differ in colour, and have no side of their own.
+            far = np.clip(side / max(float(np.abs(side).max()), 1e-6), 0.0, 1.0)
+            self.painter.far[: len(own)] = far
         flat = np.column_stack([COMPASS, np.zeros(len(COMPASS))])
         outline = self.outlines.outermost(pos, rot, np.concatenate([flat, [UP, -UP]]))
         self.outline = outline.reshape(-1, 3)
@@ -304,7 +306,7 @@ def _same_scene(first: Walk, other: Walk) -> bool:
     """Return whether one model shows both walks."""
     if first.creature.files["creature.xml"] != other.creature.files["creature.xml"]:
         return False
-    specs = [walk.marked for walk in (first, other)]
+    specs = [walk.source for walk in (first, other)]
     return len({None if spec is None else spec.to_xml() for spec in specs}) == 1
 
 

@@ -16,6 +16,7 @@ from mjxgait.certification.acceptance import how_simulated
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
+from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.reference.layout import RADIUS, Ground, StartFrame, start_frame
@@ -23,6 +24,7 @@ from mjxgait.reference.measure import Recording, measure, stride_starts
 from mjxgait.reference.outcome import Trajectory
 from mjxgait.reference.starts import Starts, nominal_starts
 from mjxgait.reference.terrain import terrain_of
+from mjxgait.rendering.dress import dress, face_of_eyes
 from mjxgait.training.folder import CERTIFICATE, command
 
 GEOM = mujoco.mjtGeom
@@ -37,16 +39,19 @@ BODY = "marks"
 
 
 def marked(
-    creature: Creature, goals: np.ndarray, floor: np.ndarray, bar: np.ndarray | None
+    spec: mujoco.MjSpec,
+    creature: Creature,
+    goals: np.ndarray,
+    floor: np.ndarray,
+    bar: np.ndarray | None,
 ) -> mujoco.MjSpec:
-    """Return the creature's model with the goals and the bar as its last body.
+    """Return the creature's specification with the goals and the bar added as its last body.
 
     Args:
       goals: [goals] m ahead of the start. floor: [goals] m, height of the floor there. bar: [2] m
         ahead of the start and above the floor, of its lower edge.
     """
-    spec, start = mujoco.MjSpec.from_string(creature.files["creature.xml"]), start_frame(creature)
-    body = spec.worldbody.add_body(name=BODY)
+    start, body = start_frame(creature), spec.worldbody.add_body(name=BODY)
     radius = DISC[0] * creature.frame.body_length
     for ahead, level in zip(goals, floor, strict=True):
         place = [*_ahead(start, ahead)[:2], level + DISC[1]]
@@ -122,13 +127,25 @@ class Walk:
 
     @cached_property
     def shown(self) -> mujoco.MjModel:
-        """The creature's model; goals and bar follow its own bodies and geoms."""
-        spec = self.marked
+        """The creature's model as pictures show it; goals and bar follow its own bodies."""
+        return self.creature.model if self.source is None else self.source.compile()
+
+    @cached_property
+    def dressed(self) -> mujoco.MjModel:
+        """The creature's model as files show it: colours and eyes, but neither goals nor bar."""
+        spec = self._dressed() if self.grown else None
         return self.creature.model if spec is None else spec.compile()
 
     @cached_property
+    def source(self) -> mujoco.MjSpec | None:
+        """Source of `shown`; None if that is the creature's own model."""
+        if self.marked is not None:
+            return self.marked
+        return self._dressed() if self.grown else None
+
+    @cached_property
     def marked(self) -> mujoco.MjSpec | None:
-        """Source of `shown`; None without goals and bar."""
+        """The creature with goals and bar; None without them."""
         if self.start is None:
             return None
         goals, bar = self._goals(self.start.goal[:1]), self.start.bar[0]
@@ -136,7 +153,20 @@ class Walk:
         if not len(goals) and over is None:
             return None
         places = self.creature.frame.stand_pos[:2] + np.outer(goals, self.forward)
-        return marked(self.creature, goals, self.ground_heights(places), over)
+        return marked(self._dressed(), self.creature, goals, self.ground_heights(places), over)
+
+    def _dressed(self) -> mujoco.MjSpec:
+        """The creature's specification; blocks that grew have colours and eyes."""
+        spec = mujoco.MjSpec.from_string(self.creature.files["creature.xml"])
+        if self.grown:
+            settings, rot = self.champion.settings, self.body_poses()[1][:, self.creature.trunk]
+            parts = grow(self.champion.genome, settings.parts, settings.links)
+            way = self.trunk_pos[-1] - self.trunk_pos[0]
+            way = way if self.afloat else way * [1, 1, 0]
+            length = float(np.linalg.norm(way))
+            ahead = way / length if length > LEAST_WAY else np.zeros(3)
+            dress(spec, parts, face_of_eyes(parts, rot, ahead))
+        return spec
 
     def _goals(self, first: np.ndarray) -> np.ndarray:
         """All goals [goals] of the walk, m ahead of the start."""

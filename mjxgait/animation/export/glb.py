@@ -132,7 +132,7 @@ def _scene(loops: Mapping[str, WalkLoop], travelling: bool) -> tuple[gltf.GLTF2,
     buffer = Buffer(document)
     rest_pos, rest_quat = local_poses(creature.model, skeleton, resting(loop)[None], axes)
     _add_joints(document, skeleton, rest_pos[0], rest_quat[0])
-    _add_mesh(document, buffer, pieces_of(creature.model, skeleton, axes, resting(loop)))
+    _add_mesh(document, buffer, pieces_of(loop.walk.dressed, skeleton, axes, resting(loop)))
     _add_skin(document, buffer, creature.model, skeleton, axes, resting(loop))
     _add_animations(document, buffer, loops, skeleton, axes, travelling)
     name = creature.name

@@ -56,7 +56,7 @@ def export_usd(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
         root = UsdSkel.Root.Define(stage, f"/{_word(creature.name)}")
         stage.SetDefaultPrim(root.GetPrim())
         joints = _add_skeleton(stage, root.GetPath(), loop, skeleton, travelling)
-        for piece in pieces_of(model, skeleton, axes, rest):
+        for piece in pieces_of(loop.walk.dressed, skeleton, axes, rest):
             _add_piece(stage, root.GetPath(), piece, joints)
         stage.GetRootLayer().Save()
 

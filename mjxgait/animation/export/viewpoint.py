@@ -59,7 +59,7 @@ class _Reach:
     """How far the visible surface of a creature reaches in all frames of a loop."""
 
     def __init__(self, loop: WalkLoop) -> None:
-        model = loop.walk.creature.model
+        model = loop.walk.dressed
         geoms, data = seen_geoms(model), mujoco.MjData(model)
         self.outlines = Silhouettes(model, geoms)
         self.axes = gltf_axes(loop.walk.forward)
