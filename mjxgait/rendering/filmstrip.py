@@ -87,7 +87,7 @@ def strobe(walk: Walk) -> Image.Image:
     stage, frames = Stage([walk], 2 * HEIGHT, HEIGHT), moments(walk)
     (participant,) = stage.participants
     shown = [(participant.painter, *participant.poses(frame * walk.time_step)) for frame in frames]
-    return paint(_camera(stage, walk, frames), shown, stage.origin, stage.relief)
+    return paint(_camera(stage, walk, frames), shown, stage.origin, stage.relief, stage.around)
 
 
 def draw_strobe(drawing: Figure, walk: Walk, picture: Image.Image) -> None:

@@ -155,24 +155,30 @@ FAR = 100.0
 """Reach of a band to either side in m."""
 
 
-def draw_floor(camera: Camera, origin: np.ndarray, relief: Relief | None = None) -> Image.Image:
+def draw_floor(
+    camera: Camera,
+    origin: np.ndarray,
+    relief: Relief | None = None,
+    bands: tuple[tuple[int, int, int], tuple[int, int, int]] = BANDS,
+) -> Image.Image:
     """Draw bands of a round width in m with their numbers at the lower edge.
 
-    origin: [2] m, where bands are counted from, along the creature's direction.
-
-    relief: heights of uneven ground.
+    Args:
+      origin: [2] m, where bands are counted from, along the creature's direction.
+      relief: heights of uneven ground.
+      bands: the two colours of the bands.
     """
     if relief is not None:
-        picture = draw_relief(camera, origin, band_width(camera.scale), BANDS, relief)
+        picture = draw_relief(camera, origin, band_width(camera.scale), bands, relief)
         number_bands(ImageDraw.Draw(picture), camera, origin, relief)
         return picture
-    picture = Image.new("RGB", (camera.width, camera.height), BANDS[0])
+    picture = Image.new("RGB", (camera.width, camera.height), bands[0])
     draw = ImageDraw.Draw(picture)
     numbers, step = band_lines(camera, origin)
     ends = _line_ends(camera, origin, numbers, step)
     for i in np.flatnonzero(numbers[:-1] % 2):
         corners = [ends[i, 0], ends[i, 1], ends[i + 1, 1], ends[i + 1, 0]]
-        draw.polygon([tuple(p) for p in corners], fill=BANDS[1])
+        draw.polygon([tuple(p) for p in corners], fill=bands[1])
     number_bands(draw, camera, origin)
     return picture
 

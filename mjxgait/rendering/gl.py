@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image
 
 from mjxgait.errors import UserError
 from mjxgait.processes import python_command, safe_environment
-from mjxgait.rendering.floor import band_lines, number_bands
+from mjxgait.rendering.floor import band_lines
 from mjxgait.rendering.painter import lamp_direction
 from mjxgait.rendering.stage import Stage
+from mjxgait.rendering.surroundings import BANDS, write_marks
 
 WORKER = "mjxgait.rendering.gl_worker"
 OFF = ("disable", "disabled", "off", "false", "0")
@@ -84,8 +85,8 @@ def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[I
                         f"the GL renderer ({backend}) stopped in the middle; add --renderer painter"
                     )
                 picture = Image.frombytes("RGB", (stage.width, stage.height), raw)
-                draw = ImageDraw.Draw(picture)
-                number_bands(draw, stage.camera(frame), stage.origin, stage.relief)
+                camera = stage.camera(frame)
+                write_marks(picture, camera, stage.origin, stage.relief, stage.around)
                 yield picture
         finally:
             worker.kill()
@@ -108,7 +109,8 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
         int(n) for camera in (first, cameras[-1]) for n in band_lines(camera, stage.origin)[0]
     }
     step = band_lines(first, stage.origin)[1]
-    dark = [n for n in range(min(numbers), max(numbers)) if n % 2 and stage.relief is None]
+    plain = stage.relief is not None or stage.around.water
+    dark = [n for n in range(min(numbers), max(numbers)) if n % 2 and not plain]
     np.savez(
         path,
         xml=np.array(spec.to_xml() if spec else creature.files["creature.xml"]),
@@ -127,6 +129,9 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
         band_width=np.array(step),
         forward=stage.forward,
         lamp=lamp_direction(stage.forward),
+        water=np.array(stage.around.water),
+        angles=np.array([first.scale, first.azimuth, first.elevation]),
+        tint=np.array(stage.around.bands) / np.array(BANDS),
         **_ground(stage),
     )
 

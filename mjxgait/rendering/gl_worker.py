@@ -11,6 +11,9 @@ import mujoco
 import numpy as np
 from PIL import Image
 
+from mjxgait.rendering.floor import Camera
+from mjxgait.rendering.surroundings import tank
+
 FLOOR_GREY = 0.86
 BAND_GREY = 0.81
 BAND_HEIGHT = 1e-3
@@ -45,8 +48,25 @@ def main(path: str) -> None:
                 )
             _add_lamp(renderer.scene, centre, parts["lamp"], 0.25 * camera.distance)
             _keep_floor_out_of_shadows(renderer.scene, model.geom("floor").id)
-            _add_bands(renderer.scene, parts["bands"], float(parts["band_width"]), parts["forward"])
-            sys.stdout.buffer.write(Image.fromarray(renderer.render()).reduce(SMOOTH).tobytes())
+            _add_bands(renderer.scene, parts)
+            pixels = renderer.render()
+            if parts["water"]:
+                pixels = _in_water(pixels, _camera_of(parts, centre))
+            sys.stdout.buffer.write(Image.fromarray(pixels).reduce(SMOOTH).tobytes())
+
+
+def _camera_of(parts: dict[str, np.ndarray], centre: np.ndarray) -> Camera:
+    """The painter's camera of a frame, with all rendered pixels."""
+    scale, azimuth, elevation = (float(n) for n in parts["angles"])
+    width, height = (int(n) for n in parts["size"])
+    camera = Camera(centre, parts["forward"], scale, width, height, azimuth, elevation)
+    return camera.enlarged(SMOOTH)
+
+
+def _in_water(pixels: np.ndarray, camera: Camera) -> np.ndarray:
+    """The painter's water where GL has drawn nothing, which it leaves black."""
+    empty = ~pixels.any(axis=-1, keepdims=True)
+    return np.where(empty, np.asarray(tank(camera)), pixels)
 
 
 def _compiled(parts: dict[str, np.ndarray]) -> mujoco.MjModel:
@@ -84,7 +104,7 @@ def _prepared(model: mujoco.MjModel, parts: dict[str, np.ndarray]) -> mujoco.MjM
     head.active, head.ambient[:], head.diffuse[:], head.specular[:] = 1, 0.42, 0.18, 0.05
     floor = model.geom("floor").id
     model.geom_matid[floor] = -1
-    model.geom_rgba[floor] = [FLOOR_GREY, FLOOR_GREY, FLOOR_GREY, 1]
+    model.geom_rgba[floor] = [*FLOOR_GREY * parts["tint"][0], 0 if parts["water"] else 1]
     if model.geom_type[floor] == mujoco.mjtGeom.mjGEOM_PLANE:
         model.geom_size[floor, :2] = 0
     return model
@@ -109,16 +129,15 @@ def _keep_floor_out_of_shadows(scene: mujoco.MjvScene, floor: int) -> None:
             geom.category = int(mujoco.mjtCatBit.mjCAT_DECOR)
 
 
-def _add_bands(
-    scene: mujoco.MjvScene, middles: np.ndarray, width: float, forward: np.ndarray
-) -> None:
+def _add_bands(scene: mujoco.MjvScene, parts: dict[str, np.ndarray]) -> None:
     """Add bands across the direction of travel at points [n, 2] m."""
+    middles, width, forward = parts["bands"], float(parts["band_width"]), parts["forward"]
     turn = np.array([[forward[0], -forward[1], 0], [forward[1], forward[0], 0], [0, 0, 1]])
     for middle in middles:
         geom = scene.geoms[scene.ngeom]
         size, colour = (
             np.array([width / 2, 50.0, BAND_HEIGHT / 2]),
-            np.array([BAND_GREY, BAND_GREY, BAND_GREY, 1], np.float32),
+            np.array([*BAND_GREY * parts["tint"][1], 1], np.float32),
         )
         mujoco.mjv_initGeom(
             geom,

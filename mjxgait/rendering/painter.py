@@ -12,8 +12,9 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFilter
 
 from mjxgait.rendering.floor import LIGHT as TOWARDS_LAMP
-from mjxgait.rendering.floor import Camera, Relief, draw_floor
+from mjxgait.rendering.floor import Camera, Relief
 from mjxgait.rendering.shapes import Silhouettes, fill_mesh, hit
+from mjxgait.rendering.surroundings import PLAIN, Surroundings, backdrop, write_over
 
 SMOOTH = 2
 """Rays per pixel and direction."""
@@ -85,6 +86,7 @@ def paint(
     creatures: Sequence[tuple[Painter, np.ndarray, np.ndarray]],
     origin: np.ndarray,
     relief: Relief | None = None,
+    around: Surroundings = PLAIN,
 ) -> Image.Image:
     """Return one frame.
 
@@ -93,18 +95,22 @@ def paint(
         of its geoms.
       origin: [2] m, where the scale on the floor is zero.
       relief: heights of uneven ground.
+      around: the medium, and the light.
     """
     fine = camera.enlarged(SMOOTH)
-    picture = draw_floor(camera, origin, relief).resize(
+    picture = backdrop(camera, origin, relief, around).resize(
         (fine.width, fine.height), Image.Resampling.BICUBIC
     )
-    rims = [painter.shadows(pos, rot) for painter, pos, rot in creatures]
-    _shade_floor(picture, fine, rims, relief)
+    if not around.water:
+        rims = [painter.shadows(pos, rot) for painter, pos, rot in creatures]
+        _shade_floor(picture, fine, rims, relief)
     canvas, first = _Canvas(np.asarray(picture, dtype=np.float32).copy(), fine), 0
     for painter, pos, rot in creatures:
         painter.draw(canvas, pos, rot, first)
         first += painter.model.nbody
-    return canvas.image().reduce(SMOOTH)
+    picture = canvas.image().reduce(SMOOTH)
+    write_over(picture, camera, around)
+    return picture
 
 
 def _shade_floor(

@@ -13,6 +13,7 @@ from PIL import Image
 from mjxgait.rendering.floor import Camera, Relief, view_of
 from mjxgait.rendering.painter import COMPASS, Painter, paint
 from mjxgait.rendering.shapes import Silhouettes
+from mjxgait.rendering.surroundings import Surroundings
 from mjxgait.rendering.walk import Walk
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -49,6 +50,14 @@ class Participant:
     def trunk(self, time: float) -> np.ndarray:
         """Return the trunk's position [3] m in the scene."""
         return self.placed(self.walk.trunk_pos[self.frame(time)])
+
+    @property
+    def light(self) -> np.ndarray | None:
+        """Place [3] m of the task's light in the scene; None if it has none."""
+        start = self.walk.start
+        if start is None or not start.light[0].any():
+            return None
+        return self.placed(self.walk.trunk_pos[0] + start.light[0])
 
     def poses(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return positions [G, 3] m and rotations [G, 3, 3] in the scene of all geoms shown."""
@@ -175,7 +184,7 @@ class Stage:
         for participant, lane in zip(self.participants, self.lanes, strict=True):
             pos, rot = participant.poses(frame * self.time_step)
             shown.append((participant.painter, pos + lane, rot))
-        return paint(self.camera(frame), shown, self.origin, self.relief)
+        return paint(self.camera(frame), shown, self.origin, self.relief, self.around)
 
     def root_poses(self, time: float) -> np.ndarray:
         """Return poses [lanes, nq] of walks that are alike, each in its lane; time: s."""
@@ -204,6 +213,16 @@ class Stage:
         level = float(self.relief(*point)) if self.relief else 0.0
         middle = trunk[2] if participant.walk.afloat else 0.5 * participant.top + level
         return self.camera(frame).pixels(np.append(point, middle))
+
+    @cached_property
+    def around(self) -> Surroundings:
+        """Surroundings of all, by their medium; the light is that of the first with one."""
+        walks = [one.walk for one in self.participants]
+        places = zip(self.participants, self.lanes, strict=True)
+        lights = [one.light + lane for one, lane in places if one.light is not None]
+        water = all(walk.afloat for walk in walks)
+        sand = not water and all(walk.grown for walk in walks)
+        return Surroundings(water, sand, lights[0] if lights else None)
 
     @property
     def relief(self) -> Relief | None:
