@@ -112,7 +112,7 @@ def simulate(
     fall: Fall | None = None,
     threads: int = 0,
     watch: Watch | None = None,
-    twin: ReferenceController | None = None,
+    reference: ReferenceController | None = None,
 ) -> Outcome:
     """Simulate the champion from every start; a start without a goal gets the task's nominal one.
 
@@ -125,7 +125,7 @@ def simulate(
       threads: 0 takes the machine's cores. The result does not depend on it.
       watch: receives the simulations that can no longer succeed, and ends all once that decides
         the result. The distances until then do depend on threads.
-      twin: replaces the champion's own reference controller. One that treats simulations
+      reference: replaces the champion's own reference controller. One that treats simulations
         differently needs a single thread.
     """
     threads = threads or cores()
@@ -141,7 +141,7 @@ def simulate(
 
     def run(share: np.ndarray) -> Outcome:
         mine, kept = starts.rows(share), int((share < record).sum())
-        stepping = Stepping(creature, champion, mine, kept, fall, task, twin)
+        stepping = Stepping(creature, champion, mine, kept, fall, task, reference)
         tell = None if watch is None else partial(watch.tell, share)
         return stepping.to_the_end(steps, None if commanded is None else commanded[share], tell)
 

@@ -61,26 +61,29 @@ class ChangingReference:
         since = memory["steps"] * self.step - memory["change"]
         share = np.clip(since / self.seconds, 0.0, 1.0)
         old, new = (
-            twin.target(self._position(twin, memory), senses, memory["steps"])
-            for twin in (self.before, self.after)
+            reference.target(self._position(reference, memory), senses, memory["steps"])
+            for reference in (self.before, self.after)
         )
         target = old + share[:, None] * (new - old)
         slow, fast = (
-            self._rate(twin, target, senses["joint_pos"]) for twin in (self.before, self.after)
+            self._rate(reference, target, senses["joint_pos"])
+            for reference in (self.before, self.after)
         )
         cycles = memory["cycles"] + slow + share * (fast - slow)
         return target, {**memory, "cycles": cycles, "steps": memory["steps"] + 1}
 
-    def _position(self, twin: PoseReference, memory: Memory) -> np.ndarray:
-        place = np.floor(self.phase(memory) * twin.length + ROUNDING)
-        return place.astype(int) % twin.length
+    def _position(self, reference: PoseReference, memory: Memory) -> np.ndarray:
+        place = np.floor(self.phase(memory) * reference.length + ROUNDING)
+        return place.astype(int) % reference.length
 
-    def _rate(self, twin: PoseReference, target: np.ndarray, joint_pos: np.ndarray) -> np.ndarray:
+    def _rate(
+        self, reference: PoseReference, target: np.ndarray, joint_pos: np.ndarray
+    ) -> np.ndarray:
         """Return cycles per step [S]; target, joint_pos: [S, J]."""
-        if twin.settings.advance == "clock":
-            return np.full(len(target), self.step / twin.tuning["period"])
+        if reference.settings.advance == "clock":
+            return np.full(len(target), self.step / reference.tuning["period"])
         error = np.sqrt(((target - joint_pos) ** 2).mean(1))
-        return (error < twin.tuning["threshold"]) / twin.length
+        return (error < reference.tuning["threshold"]) / reference.length
 
 
 class HaltingReference(PoseReference):

@@ -68,16 +68,16 @@ class Stepping:
         record: int,
         fall: Fall,
         task: Around,
-        twin: ReferenceController | None = None,
+        reference: ReferenceController | None = None,
     ) -> None:
         self.creature, self.starts, self.fall = creature, starts, fall
         self.record, self.goal, self.task = record, starts.goal.copy(), task
         step = float(creature.model.opt.timestep)
-        self.twin = twin or reference_of(creature, champion, step)
-        self.drive = Drive(creature, champion.drive, self.twin.command, step)
+        self.reference = reference or reference_of(creature, champion, step)
+        self.drive = Drive(creature, champion.drive, self.reference.command, step)
         model = examined_model(creature)
-        self.bodies = Bodies(creature, model, starts, self.twin.reads, task.drag)
-        self.memory = dict(self.twin.init(len(starts)))
+        self.bodies = Bodies(creature, model, starts, self.reference.reads, task.drag)
+        self.memory = dict(self.reference.init(len(starts)))
         self.command = np.zeros_like(starts.stiffness)
         self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
         self.finest = int(starts.refine.max())
@@ -177,10 +177,10 @@ class Stepping:
     ) -> None:
         kept = running[running < self.record]
         film.qpos[kept, k], film.qvel[kept, k] = self.bodies.qpos[kept], self.bodies.qvel[kept]
-        film.phase[kept, k] = self.twin.phase({n: m[kept] for n, m in self.memory.items()})
+        film.phase[kept, k] = self.reference.phase({n: m[kept] for n, m in self.memory.items()})
         command, torque = self._physics_step(running, k, heading)
         film.torque[kept, k] = torque[: len(kept)]
-        if self.twin.command == "pose":
+        if self.reference.command == "pose":
             film.target[kept, k] = command[: len(kept)]
         for taken in range(1, self.finest):
             self.bodies.step(running[self.starts.refine[running] > taken])
@@ -190,7 +190,7 @@ class Stepping:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the command and the torque that acts, [running, J] each."""
         state, starts = self.bodies.state(running, k, self.goal[running]), self.starts
-        if k % self.twin.every == 0:
+        if k % self.reference.every == 0:
             self.command[running] = self._act(running, state, heading)
         command = self.command[running]
         first, way = self.starts.goal[running], self.bodies.travel(running)[:, 0]
@@ -208,13 +208,13 @@ class Stepping:
 
     def _act(self, running: np.ndarray, state: State, heading: np.ndarray | None) -> np.ndarray:
         """Return the command [running, J] and advance the reference controller's memory."""
-        senses = sense(self.creature, state, self.twin.reads)
+        senses = sense(self.creature, state, self.reference.reads)
         if heading is not None:
             # With a commanded heading there is no line to return to.
             senses["heading"] = wrapped(senses["heading"] - heading)
             senses["aside"] = np.zeros_like(senses["aside"])
         before = {name: values[running] for name, values in self.memory.items()}
-        command, after = self.twin.act(before, senses)
+        command, after = self.reference.act(before, senses)
         for name, values in after.items():
             self.memory[name][running] = values
         return command

@@ -52,62 +52,62 @@ class Network:
     wires: tuple[Wire, ...]
 
 
-def network_of(twin: BrainReference, lit: bool) -> Network:
+def network_of(reference: BrainReference, lit: bool) -> Network:
     """Search breadth first from all hinges against the wires; cells not reached have no effect.
 
     lit: whether there is a light; else the light sensors are left out.
     """
-    depth = {-1 - h: 0 for h in range(len(twin.hinges))}
+    depth = {-1 - h: 0 for h in range(len(reference.hinges))}
     waiting, wires = list(depth), []
     for target in waiting:
-        for source, weight in _inputs(twin, target, lit):
+        for source, weight in _inputs(reference, target, lit):
             if source in (NOTHING, ONE):
                 continue
             wires.append(Wire(source, target, weight))
             if source not in depth:
                 depth[source] = depth[target] + 1
                 waiting.append(source)
-    cells = {number: _cell(twin, number, depth[number], lit) for number in waiting}
+    cells = {number: _cell(reference, number, depth[number], lit) for number in waiting}
     return Network(cells, tuple(wires))
 
 
-def kind_of(twin: BrainReference, column: int) -> str:
+def kind_of(reference: BrainReference, column: int) -> str:
     """Return the function of the neuron in a column."""
-    place = column - min(twin.place.values())
-    return next(kind for kind, these in twin.alike.items() if place in these)
+    place = column - min(reference.place.values())
+    return next(kind for kind, these in reference.alike.items() if place in these)
 
 
-def _inputs(twin: BrainReference, number: int, lit: bool) -> Iterator[tuple[int, float]]:
+def _inputs(reference: BrainReference, number: int, lit: bool) -> Iterator[tuple[int, float]]:
     """Column and weight of every input that a cell uses."""
-    first = min(twin.place.values())
+    first = min(reference.place.values())
     if number < 0:
-        wires = [(int(twin.driver[-1 - number]), float(twin.gain[-1 - number]))]
+        wires = [(int(reference.driver[-1 - number]), float(reference.gain[-1 - number]))]
     elif number >= first:
-        reads = READS.get(kind_of(twin, number), 1)
-        columns, weights = twin.column[number - first], twin.weight[number - first]
+        reads = READS.get(kind_of(reference, number), 1)
+        columns, weights = reference.column[number - first], reference.weight[number - first]
         wires = list(zip(columns[:reads].tolist(), weights[:reads].tolist(), strict=True))
     else:
         wires = []
-    seen = range(first - 3 * len(twin.parts), first)
+    seen = range(first - 3 * len(reference.parts), first)
     for column, weight in wires:
         yield NOTHING if column in seen and not lit else column, weight
 
 
-def _cell(twin: BrainReference, number: int, depth: int, lit: bool) -> Cell:
-    joints, parts = len(twin.hinges), len(twin.parts)
-    given = [_written(column, weight) for column, weight in _inputs(twin, number, lit)]
+def _cell(reference: BrainReference, number: int, depth: int, lit: bool) -> Cell:
+    joints, parts = len(reference.hinges), len(reference.parts)
+    given = [_written(column, weight) for column, weight in _inputs(reference, number, lit)]
     if number < 0:
-        part, hinge = twin.hinges[-1 - number]
+        part, hinge = reference.hinges[-1 - number]
         driven = "" if given == ["·"] else f" = {given[0]}"
-        return Cell(part, "hinge", f"{twin.parts[part].joint} {hinge}{driven}", depth)
+        return Cell(part, "hinge", f"{reference.parts[part].joint} {hinge}{driven}", depth)
     if number < 2 + joints:
-        part, hinge = twin.hinges[number - 2]
+        part, hinge = reference.hinges[number - 2]
         return Cell(part, "sensor", f"angle {hinge}", depth)
     if number < 2 + joints + parts:
         return Cell(number - 2 - joints, "sensor", "contact", depth)
     if given:
-        owner = next(owner for (owner, _), column in twin.place.items() if column == number)
-        return Cell(owner, "neuron", f"{kind_of(twin, number)}({', '.join(given)})", depth)
+        owner = next(owner for (owner, _), column in reference.place.items() if column == number)
+        return Cell(owner, "neuron", f"{kind_of(reference, number)}({', '.join(given)})", depth)
     part, axis = divmod(number - 2 - joints - parts, 3)
     return Cell(part, "sensor", f"light {'xyz'[axis]}", depth)
 

@@ -86,9 +86,9 @@ def _of_grown(run: Path, walk: Walk) -> Figures:
     if "graph.half" not in walk.champion.genome:
         return {}
     row = genomes.bodies_of(run, walk.champion)
-    twin = reference_of(walk.creature, walk.champion, walk.time_step)
-    assert isinstance(twin, BrainReference)
-    thoughts = network_of(twin, walk.champion.task in IN_LIGHT)
+    reference = reference_of(walk.creature, walk.champion, walk.time_step)
+    assert isinstance(reference, BrainReference)
+    thoughts = network_of(reference, walk.champion.task in IN_LIGHT)
     return {
         "graph": ((10, 4.6), lambda drawing: genomes.draw_graph(drawing, walk)),
         "brain": (brain.shape(thoughts), lambda drawing: brain.draw_brain(drawing, thoughts)),

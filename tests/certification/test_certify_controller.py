@@ -65,7 +65,7 @@ def felt(creature, *arguments, **keys):
     return sense(creature, made_up(creature, *arguments, **keys), READS)
 
 
-def twin(creature, *arguments, **keys):
+def reference(creature, *arguments, **keys):
     return PoseReference(creature, make_champion(creature, *arguments, **keys), STEP)
 
 
@@ -80,7 +80,7 @@ def poses(creature, count=2):
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_the_cycle_passes_through_the_key_poses_and_their_mirror_images(tiny, count):
     key_poses = poses(tiny, count)
-    control = twin(tiny, key_poses, interpolation=7)
+    control = reference(tiny, key_poses, interpolation=7)
     assert control.length == 2 * count * 7
     at_poses = control.planned(np.arange(2 * count) * 7)
     mirrored = np.array(
@@ -109,7 +109,7 @@ def test_a_roll_joint_changes_sign_in_the_mirror(tiny):
 
 def test_between_poses_the_target_is_linear_and_the_cycle_closes(tiny):
     key_poses = poses(tiny)
-    control = twin(tiny, key_poses, interpolation=10)
+    control = reference(tiny, key_poses, interpolation=10)
     cycle = pose_cycle(key_poses, tiny)
     np.testing.assert_allclose(
         control.planned(np.array([3]))[0], 0.7 * cycle[0] + 0.3 * cycle[1], atol=1e-15
@@ -125,7 +125,7 @@ def test_an_unsymmetric_creature_is_not_mirrored(tiny):
 
 
 def test_heading_to_the_left_and_being_on_the_left_are_positive(tiny):
-    control = twin(tiny, tuning={"steer": 0.5})
+    control = reference(tiny, tuning={"steer": 0.5})
     assert control.corrections(felt(tiny, rotation("z", 0.3)))[0] == pytest.approx(0.15)
     on_the_left = felt(tiny, pos=(4.0, 0.2, 0.3))
     assert control.corrections(on_the_left)[0] == pytest.approx(
@@ -135,7 +135,7 @@ def test_heading_to_the_left_and_being_on_the_left_are_positive(tiny):
 
 
 def test_nose_down_and_right_side_down_are_positive(tiny):
-    still = twin(tiny, tuning={"pitch": 1.0, "roll": 2.0})
+    still = reference(tiny, tuning={"pitch": 1.0, "roll": 2.0})
     _, pitch, roll = still.corrections(felt(tiny, rotation("y", 0.2)))
     assert (pitch, roll) == (pytest.approx(0.2), pytest.approx(0.0))
     _, pitch, roll = still.corrections(felt(tiny, rotation("x", 0.2)))
@@ -143,7 +143,7 @@ def test_nose_down_and_right_side_down_are_positive(tiny):
 
 
 def test_rates_are_positive_when_the_angles_grow(tiny):
-    swinging = twin(tiny, tuning={"pitch_rate": 0.1, "roll_rate": 0.2})
+    swinging = reference(tiny, tuning={"pitch_rate": 0.1, "roll_rate": 0.2})
     turned = rotation("z", 1.0)
     _, pitch, roll = swinging.corrections(felt(tiny, turned, angvel=turned @ [0.7, 0.5, 9.0]))
     assert (pitch, roll) == (pytest.approx(0.05), pytest.approx(0.14))
@@ -153,7 +153,7 @@ def test_the_corrected_target_equals_the_documented_sum(tiny):
     key_poses = poses(tiny)
     stand = np.full(8, 0.05)
     creature = altered(tiny, joints={"stand": stand})
-    control = twin(creature, key_poses, {"steer": 1.0, "pitch": 1.0, "roll": 1.0})
+    control = reference(creature, key_poses, {"steer": 1.0, "pitch": 1.0, "roll": 1.0})
     rot = rotation("z", 0.1) @ rotation("y", 0.2)
     u, p, r = (float(part[0]) for part in control.corrections(felt(creature, rot)))
     target = control.target(np.array([0]), felt(creature, rot), np.zeros(1, int))[0]
@@ -170,7 +170,7 @@ def test_the_corrected_target_equals_the_documented_sum(tiny):
 
 
 def test_the_target_stays_within_the_joint_ranges(tiny):
-    control = twin(tiny, np.full((2, 8), 3.0))
+    control = reference(tiny, np.full((2, 8), 3.0))
     np.testing.assert_array_equal(
         control.target(np.array([0]), felt(tiny), np.zeros(1, int))[0], tiny.joints.high
     )
@@ -224,7 +224,7 @@ def test_plain_pd(tiny):
 
 
 def test_the_position_advances_if_the_pose_error_is_below_the_threshold(tiny):
-    control = twin(tiny, tuning={"threshold": 0.12})
+    control = reference(tiny, tuning={"threshold": 0.12})
     off = np.zeros((3, 8))
     off[0], off[1], off[2, 0] = 0.119, 0.121, 0.12 * np.sqrt(8) * 0.99
     np.testing.assert_array_equal(
@@ -233,7 +233,7 @@ def test_the_position_advances_if_the_pose_error_is_below_the_threshold(tiny):
 
 
 def test_the_clock_advances_at_any_error(tiny):
-    control = twin(tiny, tuning={"period": 0.8}, advance="clock")
+    control = reference(tiny, tuning={"period": 0.8}, advance="clock")
     far = np.ones((1, 8))
     at = [
         int(control.advance(np.array([0]), far, 0 * far, np.array([k]))[0])

@@ -17,9 +17,9 @@ def test_targets_are_those_of_the_reference_controller(stool_walk):
     """Without steering and balance the target is the planned pose."""
     from mjxgait.controllers.key_poses.reference import PoseReference
 
-    twin = PoseReference(stool_walk.creature, stool_walk.champion, stool_walk.time_step)
-    positions = np.round(stool_walk.trajectory.phase[0] * twin.length).astype(int)
-    np.testing.assert_allclose(stool_walk.trajectory.target[0], twin.planned(positions))
+    reference = PoseReference(stool_walk.creature, stool_walk.champion, stool_walk.time_step)
+    positions = np.round(stool_walk.trajectory.phase[0] * reference.length).astype(int)
+    np.testing.assert_allclose(stool_walk.trajectory.target[0], reference.planned(positions))
 
 
 def test_a_walk_that_falls_ends_soon_after():

@@ -135,10 +135,10 @@ def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
     """
     creature, step = walk.creature, walk.time_step
     halts, fades = (each.ravel() for each in np.meshgrid(moments, FADES))
-    twin = HaltingReference(creature, walk.champion, step, halts, fades)
+    reference = HaltingReference(creature, walk.champion, step, halts, fades)
     starts, seconds = nominal_starts(creature, len(halts)), float(moments[-1]) + SETTLES
     outcome = simulate(
-        creature, walk.champion, starts, seconds, record=len(halts), threads=1, twin=twin
+        creature, walk.champion, starts, seconds, record=len(halts), threads=1, reference=reference
     )
     film = outcome.trajectory
     root = creature.root_dof

@@ -186,7 +186,7 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
     moments = WARMUP + np.arange(MOMENTS) / MOMENTS
     steps = round((moments[-1] + SECONDS + SETTLES + WATCHED) / step)
     told = commanded_headings(before, after, moments, steps, step)
-    twin = ChangingReference(creature, before, after, step, moments, SECONDS)
+    reference = ChangingReference(creature, before, after, step, moments, SECONDS)
     outcome = simulate(
         creature,
         after,
@@ -195,7 +195,7 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
         record=MOMENTS,
         heading=told,
         threads=1,
-        twin=twin,
+        reference=reference,
     )
     return outcome.stayed_up & _as_told(creature, outcome, float(after.wish["speed"]))
 

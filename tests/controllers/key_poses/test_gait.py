@@ -256,10 +256,10 @@ def test_steering_gain_matches_the_reference_controller(stool: Creature):
         cycle = control.prepare(Genome(jnp.asarray(poses), genes), rules)
         target, _ = control.act(cycle, control.init(), felt)
         named = dict(zip(TUNING, map(float, genes), strict=True))
-        twin = PoseReference(creature, pose_champion(creature, poses, named, rules), 0.005)
+        reference = PoseReference(creature, pose_champion(creature, poses, named, rules), 0.005)
         of_one = {name: np.asarray(value)[None] for name, value in felt.items()}
         np.testing.assert_allclose(
-            target, twin.target(np.zeros(1, int), of_one, np.zeros(1, int))[0], atol=1e-5
+            target, reference.target(np.zeros(1, int), of_one, np.zeros(1, int))[0], atol=1e-5
         )
         targets.append(target - poses[0])
     np.testing.assert_allclose(targets[1], 2 * targets[0], atol=1e-5)

@@ -255,8 +255,8 @@ def test_the_reference_controller_steps_the_same(biped):
     )
     values = dict.fromkeys(TUNING, 0.0) | {"threshold": 0.1, "period": 0.8} | genes
     champion = pose_champion(creature, np.stack([biped.joints.stand] * 2), values)
-    twin = PoseReference(creature, champion, STEP)
-    assert set(twin.reads) == set(reads)
+    reference = PoseReference(creature, champion, STEP)
+    assert set(reference.reads) == set(reads)
     for _ in range(6):
         turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
         turn *= np.sign(np.linalg.det(turn))
@@ -272,8 +272,8 @@ def test_the_reference_controller_steps_the_same(biped):
         felt = sense(creature, moment, jnp.zeros(()), reads)
         ours = stepping(creature, jnp.array([genes[name] for name in STEPPING]), felt)
         state = as_examined(creature, moment)
-        theirs = twin.target(
-            np.zeros(1, int), examiner_sense(creature, state, twin.reads), np.zeros(1, int)
+        theirs = reference.target(
+            np.zeros(1, int), examiner_sense(creature, state, reference.reads), np.zeros(1, int)
         )
         np.testing.assert_allclose(np.asarray(ours), theirs[0] - creature.joints.stand, atol=2e-5)
 
@@ -286,16 +286,16 @@ def test_the_cycle_fades_in_from_the_standing_pose(biped: Creature, begin: float
     champion = pose_champion(
         biped, np.stack([pose] * 2), {"begin": begin}, PoseConfig(mirror=False)
     )
-    control, twin = PoseTracker(biped, STEP), PoseReference(biped, champion, STEP)
+    control, reference = PoseTracker(biped, STEP), PoseReference(biped, champion, STEP)
     genome = Genome(*(jnp.asarray(champion.genome[name]) for name in ("key_poses", "tuning")))
     cycle = control.prepare(genome, champion.settings)
     moment = seen(biped)
     felt = sense(biped, moment, jnp.zeros(()), control.reads)
-    examined = examiner_sense(biped, as_examined(biped, moment), twin.reads)
+    examined = examiner_sense(biped, as_examined(biped, moment), reference.reads)
     for steps in (0, 24, 49, 99, 500):
         state = dataclasses.replace(control.init(), steps=jnp.int32(steps))
         ours, _ = control.act(cycle, state, felt)
-        theirs = twin.target(np.zeros(1, int), examined, np.full(1, steps))[0]
+        theirs = reference.target(np.zeros(1, int), examined, np.full(1, steps))[0]
         share = min(1.0, (steps + 1) * STEP / begin) if begin else 1.0
         expected = stand + share * (pose - stand)
         np.testing.assert_allclose(ours, expected, atol=1e-6)

@@ -66,10 +66,10 @@ def test_a_brain_matches_its_reference_controller():
     think = jax.jit(jax.vmap(lambda b, m, p: thought(b, m, p, STEP)))
     neurons = CAPACITY.parts * ROOM.local + ROOM.central
     minds = jax.vmap(lambda _: blank(neurons))(jnp.arange(COUNT))
-    links, twins = zip(
-        *(twin(one(genotypes, i), one(bodies, i)) for i in range(COUNT)), strict=True
+    links, references = zip(
+        *(reference(one(genotypes, i), one(bodies, i)) for i in range(COUNT)), strict=True
     )
-    memories = [t.init(1) for t in twins]
+    memories = [t.init(1) for t in references]
     rng, wrong, driven = np.random.default_rng(4), np.zeros(COUNT), 0
     for _ in range(4):
         angles = np.float32(rng.uniform(-1, 1, (COUNT, CAPACITY.links)))
@@ -77,13 +77,13 @@ def test_a_brain_matches_its_reference_controller():
         light = np.float32(rng.normal(size=(COUNT, CAPACITY.links, 3)))
         torque, minds = think(brains, minds, Perceived(angles, contact, light))
         for i in np.flatnonzero([len(found) > 0 for found in links]):
-            last = one(bodies, i).parts.last[: len(twins[i].parts)]
+            last = one(bodies, i).parts.last[: len(references[i].parts)]
             senses = {
                 "joint_pos": angles[i][None, links[i]],
                 "contact": contact[i][None, last],
                 "light": light[i][None, last],
             }
-            plain, memories[i] = twins[i].act(memories[i], senses)
+            plain, memories[i] = references[i].act(memories[i], senses)
             most = one(bodies, i).strength[links[i]]
             wrong[i] = max(
                 wrong[i], (np.abs(np.asarray(torque)[i, links[i]] - plain[0]) / most).max()
@@ -115,7 +115,7 @@ def brain_of(genotype: Genotype) -> BrainReference:
     return BrainReference(genome, parts, hinges, STEP)
 
 
-def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainReference]:
+def reference(genotype: Genotype, body: Body) -> tuple[list[int], BrainReference]:
     """The links of all hinges, part by part, and the brain that drives them."""
     plain = brain_of(genotype)
     links = [

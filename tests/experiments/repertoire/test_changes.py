@@ -49,11 +49,11 @@ def one_by_one(work: Callable, ways: Sequence, tell: Callable[[int, int], object
 
 def film(creature: Creature, before: Champion, after: Champion, seconds: float = 3.0) -> Trajectory:
     step = creature.model.opt.timestep
-    twin = ChangingReference(creature, before, after, step, CHANGES, SECONDS)
+    reference = ChangingReference(creature, before, after, step, CHANGES, SECONDS)
     starts = nominal_starts(creature, len(CHANGES))
     count = len(CHANGES)
     return simulate(
-        creature, before, starts, seconds, record=count, threads=1, twin=twin
+        creature, before, starts, seconds, record=count, threads=1, reference=reference
     ).trajectory
 
 

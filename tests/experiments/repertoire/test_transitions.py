@@ -119,9 +119,15 @@ def root_of(document: gltf.GLTF2, number: int) -> np.ndarray:
 def test_a_commanded_stop_ends_the_walk_in_the_stand(walk: Walk):
     """Each simulation stops at its own moment."""
     stool, halts = walk.creature, np.array([1.0, 1.5, np.inf])
-    twin = HaltingReference(stool, walk.champion, walk.time_step, halts, np.full(3, 0.2))
+    reference = HaltingReference(stool, walk.champion, walk.time_step, halts, np.full(3, 0.2))
     film = simulate(
-        stool, walk.champion, nominal_starts(stool, 3), 3.0, record=3, threads=1, twin=twin
+        stool,
+        walk.champion,
+        nominal_starts(stool, 3),
+        3.0,
+        record=3,
+        threads=1,
+        reference=reference,
     ).trajectory
     assert np.array_equal(film.target[2], walk.trajectory.target[0, : film.target.shape[1]])
     for row, halt in enumerate(halts[:2]):
