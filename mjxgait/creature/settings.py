@@ -148,6 +148,18 @@ class Termination:
 
 
 @dataclasses.dataclass(frozen=True)
+class RigSettings:
+    """The character that the creature was imported from.
+
+    file: its name. bones: name of the bone in it, by the part that was made of it.
+    """
+
+    __pydantic_config__ = STRICT
+    file: str = ""
+    bones: dict[str, str] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
 class Usual:
     """Default walk targets of the creature. gait: as after `--gait`."""
 
@@ -168,5 +180,6 @@ class CreatureSettings:
     balance: Balance = dataclasses.field(default_factory=Balance)
     stepping: Stepping = dataclasses.field(default_factory=Stepping)
     termination: Termination = dataclasses.field(default_factory=Termination)
+    rig: RigSettings = dataclasses.field(default_factory=RigSettings)
     usual: Usual = dataclasses.field(default_factory=Usual)
     train: dict[str, object] = dataclasses.field(default_factory=dict)

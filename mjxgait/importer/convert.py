@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import mujoco
@@ -141,7 +141,12 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     name = plain_names([choices.name or path.stem], ["creature"])[0].strip(".-") or "creature"
     if rest is not None:
         rest[:3] = best.qpos[:3]
-    return _folder(name, one_line(path.name), best, mirror, planar, rest)
+    bones = {
+        body.name: source.bones[model.body(b).name]
+        for body, b in zip(anatomy.spec.bodies[1:], anatomy.bodies, strict=True)
+        if source.bones
+    }
+    return _folder(name, one_line(path.name), best, mirror, planar, rest, bones)
 
 
 def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
@@ -155,8 +160,8 @@ def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
                 f"--height is for skeletons ({', '.join(RIGS)}); {path} has its lengths"
             )
         return read_source(path, choices.search, notes)
-    tree, up = model_of(path, choices.up, choices.height, notes)
-    return Source(tree, up=up)
+    tree, up, bones = model_of(path, choices.up, choices.height, notes)
+    return Source(tree, up=up, bones=bones)
 
 
 def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:
@@ -186,8 +191,12 @@ def _folder(
     mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
     rest: np.ndarray | None,
+    bones: Mapping[str, str],
 ) -> Imported:
-    """Write the texts of the folder. rest: [nq] rest pose of a skeleton, None for other models."""
+    """Write the texts of the folder.
+
+    rest: [nq] rest pose of a skeleton, None for other models. bones: its bones by part.
+    """
     puppet, notes = best.puppet, best.notes
     notes.guess("trunk", puppet.bodies[0].name, "high", "the body that all limbs hang on")
     notes.guess(
@@ -214,7 +223,15 @@ def _folder(
         notes.guess("body_length", f"{hip:.3g}", "medium", why)
     train = _train(best, mirror is not None, hip, length)
     toml = creature_toml(
-        name, origin, best, mirror is not None, pairs, length if shorter else None, passing, train
+        name,
+        origin,
+        best,
+        mirror is not None,
+        pairs,
+        length if shorter else None,
+        passing,
+        bones,
+        train,
     )
     report = (
         f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.animation.clips.clip import Rig
+from mjxgait.animation.clips.clip import Rig, written
 from mjxgait.animation.clips.read_glb import rig_of_glb
 from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.errors import UserError
@@ -36,8 +36,8 @@ SKINNED = 8
 
 def model_of(
     path: Path, up: str | None, height: float | None, notes: Notes
-) -> tuple[ET.Element, Guess]:
-    """Return an MJCF tree of a BVH or GLB file's skeleton, and its up axis.
+) -> tuple[ET.Element, Guess, dict[str, str]]:
+    """Return an MJCF tree of a BVH or GLB file's skeleton, its up axis, and its bones by part.
 
     Args:
       up: that axis, if the user states it. height: m, at rest.
@@ -61,7 +61,8 @@ def model_of(
         [f"bone_{i}" for i in range(len(plan.rig.names))],
     )
     _tell(plan, hinges, names, notes)
-    return _written(plan, hinges, radii, names, notes), upward
+    bones = dict(zip(names, map(written, plan.rig.names), strict=True))
+    return _tree(plan, hinges, radii, names, notes), upward, bones
 
 
 def _bare(rig: Rig) -> Rig:
@@ -169,7 +170,7 @@ def _distances(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.linalg.norm(points - a - share[:, None] * along, axis=1)
 
 
-def _written(
+def _tree(
     plan: Plan, hinges: list[list[Hinge]], radii: list[float], names: list[str], notes: Notes
 ) -> ET.Element:
     rig = plan.rig

@@ -37,7 +37,7 @@ class Source:
     coupled: joints that follow others.
     poses: standing poses that the file offers outside keyframes.
     missing: keys of unavailable meshes, each with its expected file; MJCF only.
-    up: axis that points up, of a skeleton.
+    up: axis that points up, of a skeleton. bones: its bones by the body that is made of each.
     """
 
     tree: ET.Element
@@ -47,6 +47,7 @@ class Source:
     poses: list[list[float]] = dataclasses.field(default_factory=list)
     missing: dict[str, str] = dataclasses.field(default_factory=dict)
     up: Guess | None = None
+    bones: dict[str, str] = dataclasses.field(default_factory=dict)
 
 
 class Places:

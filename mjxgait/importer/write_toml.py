@@ -166,6 +166,7 @@ def creature_toml(
     pairs: Mapping[str, tuple[str, int]],
     body_length: float | None,
     planar: bool,
+    bones: Mapping[str, str],
     train: Table,
 ) -> str:
     """Return the text of creature.toml.
@@ -173,8 +174,8 @@ def creature_toml(
     Args:
       origin: the model file's name, in one line. best: the creature in its standing pose. pairs:
         stated mirror pairs, joint to partner and sign. body_length: m, None if the loader measures
-        it. planar: whether its legs are in one plane and pass each other. train: settings that
-        differ from the defaults.
+        it. planar: whether its legs are in one plane and pass each other. bones: of a skeleton, by
+        part. train: settings that differ from the defaults.
     """
     joints, drive, notes = best.puppet.names, best.drive, best.notes
     root = best.puppet.bodies[0]
@@ -202,6 +203,7 @@ def creature_toml(
     if planar:
         lines.append("planar = true  # high: its legs are drawn in one plane, and pass each other")
     lines += ["", *_joints(joints, drive, remark), *_mirror(symmetric, pairs, remark)]
+    lines += _rig(origin, bones)
     lines += [*_corrections(drive), "[termination]", "min_up = 0.5", "height = [0.5, 1.5]"]
     heading, *settings = tomli_w.dumps({"train": train}).splitlines()
     lines += ["touch = true", "", heading + remark.get("train", ""), *settings, ""]
@@ -268,6 +270,15 @@ def _corrections(drive: Drive) -> list[str]:
             "",
         ]
     return lines
+
+
+def _rig(origin: str, bones: Mapping[str, str]) -> list[str]:
+    """Lines of a skeleton's bones by part; none for other models."""
+    if not bones:
+        return []
+    rows = [f"{_quoted(part)} = {_quoted(bone)}" for part, bone in bones.items()]
+    about = "# what each part is called in the file, for `mjxgait export --onto`"
+    return ["[rig]", f"file = {_quoted(origin)}", "", f"[rig.bones]  {about}", *rows, ""]
 
 
 def _usual(values: np.ndarray) -> float:

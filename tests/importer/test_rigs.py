@@ -117,7 +117,7 @@ def test_every_guess_is_told(dog: Imported):
 
 def test_of_a_skin_its_bones_are_as_thick_as_it(tmp_path: Path):
     """And what moves no skin, such as handles of a rig, is no part of the body."""
-    tree, _ = model_of(made(tmp_path, "glb"), None, None, Notes())
+    tree, *_ = model_of(made(tmp_path, "glb"), None, None, Notes())
     bodies = {body.get("name"): body for body in tree.iter("body")}
     assert set(bodies) == set(DOG)
     for leg in ("LeftThigh", "RightShin", "LeftForearm"):
@@ -266,7 +266,8 @@ def test_limbs_that_lie_sideways_swing_about_the_upright_axis(tmp_path: Path):
 def test_names_lose_what_a_tool_put_before_them(tmp_path: Path):
     file = tmp_path / "dog.bvh"
     file.write_text(bvh(prefix="mixamorig:"))
-    tree, _ = model_of(file, None, None, Notes())
+    tree, _, bones = model_of(file, None, None, Notes())
+    assert bones == {name: f"mixamorig:{name}" for name in DOG}
     assert {b.get("name") for b in tree.iter("body")} == set(DOG)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from mjxgait import files
 from mjxgait.errors import UserError
+from mjxgait.files import UNSHOWN
 
 NOTE = "mjxgait"
 """Name of the node property that holds an exported walk's note on its origin."""
@@ -24,6 +25,15 @@ MOST_BONES = 1000
 MOST_FRAMES = 100_000
 MOST_TURNS = 1_000_000
 """Largest number of bones times frames."""
+
+
+MOST_NAME = 200
+"""Characters of a bone's name that a creature folder keeps."""
+
+
+def written(name: str) -> str:
+    """Return a bone's name as creature folders write it, because any text may be in a file."""
+    return UNSHOWN.sub("?", name)[:MOST_NAME]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
