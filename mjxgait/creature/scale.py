@@ -157,8 +157,9 @@ def _stand(spec: mujoco.MjSpec, height: float) -> None:
     model = spec.compile()
     lift = height - _lowest(model)
     upwards = vertical_freedom(model)
-    for key in spec.keys:
-        key.qpos = np.array(key.qpos) + lift * upwards
+    for number, key in enumerate(spec.keys):
+        # MuJoCo leaves out of a file what is as in the zero pose.
+        key.qpos = model.key_qpos[number] + lift * upwards
     for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
         body = spec.body(model.body(model.jnt_bodyid[joint]).name)
         body.pos = body.pos + np.array([0.0, 0.0, lift])

@@ -17,7 +17,7 @@ from mjxgait.animation.clips.read_text import read_bvh, rig_of_bvh
 from mjxgait.animation.keys.retarget import axes_of, retarget
 from mjxgait.cli.import_ import import_command
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.scale import load_files, scaled
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, Imported, import_model
 from mjxgait.importer.notes import Notes
@@ -69,6 +69,14 @@ def test_it_stands_on_its_four_feet(dog: Imported, creature: Creature):
     assert dog.stands
     assert sorted(name.removesuffix("_foot") for name in creature.feet.names) == sorted(FEET)
     assert creature.mirror.symmetric
+
+
+def test_its_parts_can_be_scaled(creature: Creature):
+    """Also where the standing pose is the zero pose, which MuJoCo leaves out of the file."""
+    xml = creature.files["creature.xml"]
+    plain = re.sub(r'(<key name="\w+") qpos="[^"]*"', r"\1", xml)
+    longer = scaled(load_files({**creature.files, "creature.xml": plain}), {"*Shin": 1.2})
+    assert longer.frame.hip_height > 1.02 * creature.frame.hip_height
 
 
 def test_its_joints_are_where_its_bones_begin(creature: Creature):
