@@ -272,6 +272,19 @@ def test_the_command_writes_the_file(stool_run, tmp_path, capsys):
     assert (tmp_path / "walk.glb").read_bytes()[:4] == b"glTF"
 
 
+def test_the_file_states_when_the_feet_are_down(stool_run, tmp_path):
+    with pytest.raises(SystemExit):
+        main(["export", str(stool_run), "--out", str(tmp_path / "walk.glb")])
+    document = gltf.GLTF2.load_from_bytes((tmp_path / "walk.glb").read_bytes())
+    (animation,) = document.animations
+    end = read(document, animation.samplers[0].input).max()
+    for fall in animation.extras["contacts"]:
+        assert fall["foot"] in {node.name for node in document.nodes}
+        assert 0 <= fall["down"] < end
+        assert fall["down"] < fall["up"] < 2 * end
+    assert len({fall["foot"] for fall in animation.extras["contacts"]}) == 4
+
+
 VALIDATE = """
 require("gltf-validator").validateBytes(new Uint8Array(require("fs").readFileSync(process.argv[1])))
   .then(report => console.log(JSON.stringify(report.issues)))

@@ -14,6 +14,7 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.clips.clip import NOTE
+from mjxgait.animation.export.footfalls import contacts
 from mjxgait.animation.export.gltf import Buffer, add_floor, add_tiles
 from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.skeleton import (
@@ -73,16 +74,18 @@ def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
       UserError: the file cannot be written.
     """
     try:
-        write_bytes(path, build_glb(loop, travelling))
+        write_bytes(path, build_glb(loop, travelling, footfalls=True))
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror})") from None
 
 
-def build_glb(loop: WalkLoop, travelling: bool = False, floor: bool = False) -> bytes:
+def build_glb(
+    loop: WalkLoop, travelling: bool = False, floor: bool = False, footfalls: bool = False
+) -> bytes:
     """The bytes of the file.
 
     travelling: the root moves forward at an even speed; otherwise the creature walks in place.
-    floor: rungs pass below it.
+    floor: rungs pass below it. footfalls: the animation states when feet are down.
     """
     document, buffer = _scene({"walk": loop}, travelling)
     if floor:
@@ -93,6 +96,9 @@ def build_glb(loop: WalkLoop, travelling: bool = False, floor: bool = False) -> 
         "frames_per_s": loop.rate,
         "travelling": travelling,
     }
+    if footfalls:
+        feet = loop.walk.creature.feet.names
+        document.animations[0].extras = {"contacts": contacts(loop, feet)}
     # Blender keeps a node's extras and drops the file's.
     document.nodes[0].extras = document.extras | note_of(loop)
     buffer.close()

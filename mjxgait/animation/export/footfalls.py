@@ -1,0 +1,66 @@
+"""When the feet of a loop are down, for dust, sound and inverse kinematics in other programs.
+
+Letters: `T` recorded frames of the loop, `N` feet.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import binary_closing, binary_opening
+
+from mjxgait.animation.export.loop import WalkLoop
+
+BRIEF = 0.03
+"""Seconds; a foot that leaves the floor, or touches it, for less than that does not step."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Footfall:
+    """A time in s for which a foot of the creature carries weight.
+
+    down: within the loop. up: later than the loop's end if the foot is down across its seam.
+    """
+
+    foot: int
+    down: float
+    up: float
+
+
+def footfalls(loop: WalkLoop) -> list[Footfall]:
+    """The footfalls of a loop in the order of `down`; a foot that never leaves has one."""
+    walk, (first, last) = loop.walk, loop.frames
+    carries = walk.recording.contact[first:last]
+    step = float(loop.times[-1]) / (last - first)
+    brief = max(round(BRIEF / step), 1)
+    found = [
+        Footfall(foot, round(down * step, 4), round(up * step, 4))
+        for foot, own in enumerate(carries.T)
+        for down, up in stances(own, brief)
+    ]
+    return sorted(found, key=lambda fall: (fall.down, fall.foot))
+
+
+def contacts(loop: WalkLoop, names: Sequence[str]) -> list[dict[str, str | float]]:
+    """The footfalls as files state them. names: of the feet [N] in the file."""
+    return [
+        {"foot": names[fall.foot], "down": fall.down, "up": fall.up} for fall in footfalls(loop)
+    ]
+
+
+def stances(carries: np.ndarray, brief: int) -> list[tuple[int, int]]:
+    """First frame of each stance, and the one after its last, of a cycle [T].
+
+    brief: frames; shorter gaps and stances do not count. The end of a stance across the cycle's
+    seam is counted on from its beginning.
+    """
+    count = len(carries)
+    # Three rounds, of which the middle one has both its neighbours.
+    thrice = binary_closing(np.tile(carries, 3), np.ones(brief))
+    down = binary_opening(thrice, np.ones(brief))[count : 2 * count]
+    if down.all():
+        return [(0, count)]
+    begins = np.flatnonzero(down & ~np.roll(down, 1))
+    ends = np.flatnonzero(~down & np.roll(down, 1))
+    ends = np.append(ends, ends[:1] + count)
+    return [(int(begin), int(ends[ends > begin][0])) for begin in begins]
