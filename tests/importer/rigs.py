@@ -76,10 +76,16 @@ def _between(one: tuple[float, float, float], other: tuple[float, float, float])
     return " ".join(f"{b - a:g}" for a, b in zip(one, other, strict=True))
 
 
-def glb(bones: Mapping[str, Bone] = DOG, thick: float = 0.03, handles: bool = True) -> bytes:
+def glb(
+    bones: Mapping[str, Bone] = DOG,
+    thick: float = 0.03,
+    handles: bool = True,
+    soles: bool = False,
+) -> bytes:
     """A mesh of rings about each bone that follow it alone, below an armature in centimetres.
 
     thick: m, radius of the rings. handles: a root on the floor, and a bone that moves no skin.
+    soles: also a point above and one below the end of each limb.
     """
     document = gltf.GLTF2(asset=gltf.Asset(version="2.0"))
     buffer = Buffer(document)
@@ -104,6 +110,9 @@ def glb(bones: Mapping[str, Bone] = DOG, thick: float = 0.03, handles: bool = Tr
             rings = _rings(0.01 * world[name], 0.01 * far, thick)
             points.append(rings)
             joints.append(np.full(len(rings), i))
+        if soles and end:
+            points.append(0.01 * np.array(end) + thick * np.array([[0, 1, 0], [0, -1, 0]]))
+            joints.append(np.full(2, i))
     _add_skin(document, buffer, world, np.concatenate(points), np.concatenate(joints), handles)
     document.scenes = [gltf.Scene(nodes=[len(document.nodes) - 2, len(document.nodes) - 1])]
     buffer.close()

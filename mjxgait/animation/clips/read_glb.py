@@ -236,25 +236,39 @@ def rig_of_glb(path: Path) -> Rig:
       UserError: it is no GLB, is damaged, or has no skin.
     """
     document = open_glb(path)
+    try:
+        return _rig(path, document, skin_of(path, document))
+    except DAMAGED as error:
+        raise UserError(f"{path}: its content is damaged ({error!r})") from None
+
+
+def skin_of(path: Path, document: gltf.GLTF2) -> int:
+    """Return the number of the skin with the most bones.
+
+    Raises:
+      UserError: there is none.
+    """
     if not document.skins:
         raise UserError(
             f"{path}: has no skin, which says what its bones are; export the armature with its "
             "mesh, or as BVH"
         )
-    try:
-        number = max(range(len(document.skins)), key=lambda s: len(document.skins[s].joints))
-        return _rig(path, document, number)
-    except DAMAGED as error:
-        raise UserError(f"{path}: its content is damaged ({error!r})") from None
+    return max(range(len(document.skins)), key=lambda s: len(document.skins[s].joints))
 
 
-def _rig(path: Path, document: gltf.GLTF2, number: int) -> Rig:
-    nodes = document.nodes
+def worlds(path: Path, nodes: Sequence[gltf.Node]) -> tuple[list[int], list[int], np.ndarray]:
+    """Parents and order of the nodes, see `tree`, and their transforms [N, 4, 4] at rest."""
     parents, order = tree(path, nodes)
     world = np.zeros((len(nodes), 4, 4))
     for node in order:
         above = np.eye(4) if parents[node] < 0 else world[parents[node]]
         world[node] = above @ placed(nodes[node])
+    return parents, order, world
+
+
+def _rig(path: Path, document: gltf.GLTF2, number: int) -> Rig:
+    nodes = document.nodes
+    parents, order, world = worlds(path, nodes)
     skins = _skins(document, number, world)
     joints = {int(joint) for joint in document.skins[number].joints}
     whole = Rig(

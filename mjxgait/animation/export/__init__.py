@@ -1,6 +1,7 @@
 """A walk as an animation file that other programs open."""
 
 from mjxgait.animation.export.bvh import build_bvh, export_bvh
+from mjxgait.animation.export.character import Character, read_character
 from mjxgait.animation.export.glb import (
     build_clips,
     build_driven,
@@ -17,11 +18,13 @@ from mjxgait.animation.export.loop import (
     walk_loop,
     walk_take,
 )
+from mjxgait.animation.export.onto import export_onto
 from mjxgait.animation.export.usd import export_usd
 from mjxgait.animation.export.viewpoint import viewpoint
 
 __all__ = [
     "RATES",
+    "Character",
     "WalkLoop",
     "build_bvh",
     "build_clips",
@@ -29,8 +32,10 @@ __all__ = [
     "build_glb",
     "export_bvh",
     "export_glb",
+    "export_onto",
     "export_usd",
     "falls_of_first_foot",
+    "read_character",
     "resampled",
     "standing_still",
     "stride_in_phase",

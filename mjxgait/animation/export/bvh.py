@@ -16,7 +16,7 @@ from mjxgait.animation.export.skeleton import (
     gltf_axes,
     resting,
     skeleton_of,
-    travel,
+    walked,
     world_poses,
 )
 from mjxgait.animation.export.surface import far_end
@@ -74,12 +74,7 @@ def _bones(loop: WalkLoop, travelling: bool) -> dict[int, Bone]:
     model, rest_qpos = loop.walk.creature.model, resting(loop)
     skeleton, axes = skeleton_of(model, loop.walk.creature.trunk), gltf_axes(loop.walk.forward)
     rest, rest_rot = (each[0] for each in world_poses(model, skeleton, rest_qpos[None], axes))
-    pos, rot = world_poses(model, skeleton, loop.qpos, axes)
-    if travelling:
-        gone, heading = travel(loop)
-        about = Rotation.from_euler("y", heading[:, None]).as_matrix()[:, None]
-        pos = (about @ pos[..., None])[..., 0] + gone[:, None]
-        rot = about @ rot
+    pos, rot = walked(loop, skeleton, axes, travelling)
     turned = rot @ rest_rot.transpose(0, 2, 1)
     # The file has no bone for the root, which stays on the floor.
     turned[:, 0], pos[:, 0], rest[0] = np.eye(3), 0.0, rest[1]

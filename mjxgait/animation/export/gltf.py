@@ -1,7 +1,12 @@
-"""Parts of a GLB file: its binary buffer, and marks on the floor.
+"""Parts of a GLB file: its binary buffer, additions to a file, and marks on the floor.
 
 Rungs pass with a walk; tiles are moved by a page. Axes are glTF's: Y up, forward +Z.
 """
+
+import json
+import struct
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
@@ -60,6 +65,72 @@ class Buffer:
         self.blob += bytes(-len(self.blob) % 4)
         self.document.buffers = [gltf.Buffer(byteLength=len(self.blob))]
         self.document.set_binary_blob(bytes(self.blob))
+
+
+HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
+"""Magic, version and length of a file; length and kind of a chunk."""
+JSON, BINARY = b"JSON", b"BIN\0"
+SAMPLES = ("input", "output")
+"""Keys of a sampler that are numbers of accessors."""
+
+
+def added(data: bytes, buffer: Buffer, nodes: Mapping[int, Mapping[str, Any]]) -> bytes:
+    """The bytes of a GLB file with the arrays and animations of a buffer's document at its end.
+
+    The description is edited as JSON, so that whatever the library does not know stays.
+
+    Args:
+      data: the file. nodes: keys to write, by the number of the node; None removes a key.
+
+    Raises:
+      ValueError, LookupError, TypeError, struct.error: the file is damaged.
+    """
+    chunks = _chunks(data)
+    whole, blob = json.loads(chunks.pop(JSON)), bytearray(chunks.pop(BINARY, b""))
+    buffers = whole.setdefault("buffers", [])
+    if sum(each["byteLength"] for each in buffers[:1]) > len(blob):
+        raise ValueError("its binary part is too short")
+    blob += bytes(-len(blob) % 4)
+    more = json.loads(buffer.document.to_json())
+    views, arrays = (whole.setdefault(key, []) for key in ("bufferViews", "accessors"))
+    for animation in more["animations"]:
+        for sampler in animation["samplers"]:
+            sampler |= {key: sampler[key] + len(arrays) for key in SAMPLES}
+    for array in more["accessors"]:
+        array["bufferView"] += len(views)
+    for view in more["bufferViews"]:
+        view["byteOffset"] += len(blob)
+    views += more["bufferViews"]
+    arrays += more["accessors"]
+    whole.setdefault("animations", []).extend(more["animations"])
+    blob += buffer.blob
+    whole["buffers"] = [{**(buffers or [{}])[0], "byteLength": len(blob)}, *buffers[1:]]
+    for number, change in nodes.items():
+        merged = whole["nodes"][number] | change
+        whole["nodes"][number] = {key: value for key, value in merged.items() if value is not None}
+    text = json.dumps(whole, separators=(",", ":")).encode()
+    return _joined({JSON: text, BINARY: bytes(blob)} | chunks)
+
+
+def _chunks(data: bytes) -> dict[bytes, bytes]:
+    """Content of a file's chunks by kind."""
+    found, at = {}, HEADER.size
+    while at + CHUNK.size <= len(data):
+        length, kind = CHUNK.unpack_from(data, at)
+        at += CHUNK.size
+        found[kind] = data[at : at + length]
+        at += length
+    return found
+
+
+def _joined(chunks: Mapping[bytes, bytes]) -> bytes:
+    """A file of chunks, each filled up to whole words: JSON with blanks."""
+    parts = []
+    for kind, content in chunks.items():
+        filled = content + (b" " if kind == JSON else b"\0") * (-len(content) % 4)
+        parts.append(CHUNK.pack(len(filled), kind) + filled)
+    body = b"".join(parts)
+    return HEADER.pack(b"glTF", 2, HEADER.size + len(body)) + body
 
 
 APART, DEEP, WIDE = 0.35, 0.06, 0.9

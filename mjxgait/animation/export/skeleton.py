@@ -8,6 +8,7 @@ import dataclasses
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.export.loop import WalkLoop
 
@@ -66,7 +67,7 @@ def local_poses(
             back = rot[:, parent].transpose(0, 2, 1)
             local_pos[:, b] = (back @ (pos[:, b] - pos[:, parent])[..., None])[..., 0]
             turned = back @ turned
-        quat[:, b] = _quaternions(turned)
+        quat[:, b] = quaternions(turned)
     return local_pos, quat
 
 
@@ -84,6 +85,21 @@ def world_poses(
         pos.append(place @ axes.T)
         rot.append(axes @ turned @ axes.T @ skeleton.turn)
     return np.array(pos), np.array(rot)
+
+
+def walked(
+    loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and rotations of the joints in each frame; see `world_poses`.
+
+    travelling: all of them move on evenly, in a circle if the walk turns.
+    """
+    pos, rot = world_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
+    if not travelling:
+        return pos, rot
+    gone, heading = travel(loop)
+    about = Rotation.from_euler("y", heading[:, None]).as_matrix()[:, None]
+    return (about @ pos[..., None])[..., 0] + gone[:, None], about @ rot
 
 
 def resting(loop: WalkLoop) -> np.ndarray:
@@ -105,7 +121,7 @@ def travel(loop: WalkLoop) -> tuple[np.ndarray, np.ndarray]:
     return chord[:, None] * ahead, turned
 
 
-def _quaternions(rotations: np.ndarray) -> np.ndarray:
+def quaternions(rotations: np.ndarray) -> np.ndarray:
     """Quaternions [F, 4] (x, y, z, w) of rotations [F, 3, 3].
 
     Neighbours lie on the same side of the sphere, so that they can be interpolated.

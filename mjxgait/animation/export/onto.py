@@ -1,0 +1,313 @@
+"""A walk as an animation of the user's own character, whose skeleton the creature was made of.
+
+Nothing of the file changes; key frames follow at its end. At rest the parts of the creature are
+where the bones are, so a bone turns from its rest as its part does. Letters: `F` key frames, `B`
+parts that have a bone, `N` nodes of the file.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Mapping
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pygltflib as gltf  # type: ignore[import-untyped]
+from scipy.spatial.transform import Rotation
+
+from mjxgait.animation.clips.read_glb import DAMAGED, name_of
+from mjxgait.animation.export.character import Character
+from mjxgait.animation.export.footfalls import contacts
+from mjxgait.animation.export.gltf import Buffer, added
+from mjxgait.animation.export.loop import WalkLoop
+from mjxgait.animation.export.skeleton import (
+    STILL,
+    gltf_axes,
+    quaternions,
+    resting,
+    skeleton_of,
+    walked,
+    world_poses,
+)
+from mjxgait.creature import Creature
+from mjxgait.creature.geometry import DOWN, geom_reach
+from mjxgait.errors import UserError
+from mjxgait.files import write_bytes
+
+LOOP = "-loop"
+"""End of the animation's name, by which Godot plays it in a loop."""
+SLACK = 0.01
+"""Hip heights by which a bone may be off its part at rest."""
+EVEN = 1e-3
+"""Relative difference of two scales, from which a bone below them would be sheared."""
+SHOWN = 4
+"""Number of bones that a message names."""
+
+
+def export_onto(loop: WalkLoop, character: Character, path: Path, travelling: bool = False) -> str:
+    """Write the loop; see `build_onto`. Return the animation's name.
+
+    Raises:
+      UserError: the file has not the creature's skeleton, or cannot be written.
+    """
+    name, data = build_onto(loop, character, travelling)
+    try:
+        write_bytes(path, data)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
+    return name
+
+
+def build_onto(loop: WalkLoop, character: Character, travelling: bool = False) -> tuple[str, bytes]:
+    """The name of the animation, and the bytes of the character's file with it.
+
+    travelling: the topmost bone moves on evenly; otherwise the character walks in place.
+
+    Raises:
+      UserError: the file has not the creature's skeleton.
+    """
+    try:
+        bones = _bones_of(loop.walk.creature, character)
+        fit = _fitted(loop, character, bones)
+        goals = _goals(loop, character, bones, fit, travelling)
+        tracks = _tracks(character, goals)
+        return _finished(loop, character, bones, fit, tracks, travelling)
+    except DAMAGED as error:
+        raise UserError(f"{character.path}: its content is damaged ({error!r})") from None
+
+
+def _bones_of(creature: Creature, character: Character) -> dict[str, int]:
+    """Node of the file by part of the creature."""
+    rig = creature.settings.rig
+    if not creature.is_rig:
+        raise UserError(
+            f"{creature.name}: was not made of a character's skeleton, so no file has its bones; "
+            "leave --onto out, or import your character and train it"
+        )
+    if creature.model.body(creature.trunk).name not in rig.bones:
+        raise UserError(
+            f"{creature.name}: its folder does not say which bones its parts are, because an earlier "
+            "version imported it; import the character again, and train it"
+        )
+    found = {part: character.bones.get(bone, ()) for part, bone in rig.bones.items()}
+    if lost := [rig.bones[part] for part, nodes in found.items() if not nodes]:
+        raise UserError(
+            f"{character.path}: lacks bones of which {creature.name} was made: {_listed(lost)}; name "
+            f"the file that was imported ({rig.file}), or import this one and train it"
+        )
+    if twice := [rig.bones[part] for part, nodes in found.items() if len(nodes) > 1]:
+        raise UserError(
+            f"{character.path}: has several bones called {_listed(twice)}; give each its own name, "
+            "import the file again, and train it"
+        )
+    return {part: nodes[0] for part, nodes in found.items()}
+
+
+def _listed(names: list[str]) -> str:
+    """Names in quotes, and the number of those left out."""
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return ", ".join(f'"{name}"' for name in names[:SHOWN]) + more
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Fit:
+    """Where the creature's world lies in the file's scene.
+
+    factor: units of the file per m. turn: [3, 3] from the axes of `gltf_axes`. shift: [3] place of
+    the origin, which is on the floor.
+    """
+
+    factor: float
+    turn: np.ndarray
+    shift: np.ndarray
+
+    def places(self, pos: np.ndarray) -> np.ndarray:
+        """Places [..., 3] in the scene of places in m."""
+        moved: np.ndarray = self.factor * pos @ self.turn.T + self.shift
+        return moved
+
+    def turns(self, rot: np.ndarray) -> np.ndarray:
+        """Rotations [..., 3, 3] in the scene of rotations in the creature's world."""
+        turned: np.ndarray = self.turn @ rot @ self.turn.T
+        return turned
+
+
+def _fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> Fit:
+    """The fit by least squares of the resting creature to the bones at rest.
+
+    Then the floor is moved to where the feet are lowest at rest: a body that bends its knees to
+    stand would else walk above it.
+    """
+    creature = loop.walk.creature
+    skeleton, axes = skeleton_of(creature.model, creature.trunk), gltf_axes(loop.walk.forward)
+    pos, _ = world_poses(creature.model, skeleton, resting(loop)[None], axes)
+    parts = pos[0, [skeleton.names.index(part) for part in bones]]
+    places = character.world[list(bones.values()), :3, 3]
+    own, other = parts - parts.mean(0), places - places.mean(0)
+    factor = float(np.sqrt((other**2).sum() / (own**2).sum()))
+    if factor == 0.0:
+        raise ValueError("all its bones are in one place")
+    turn = Rotation.align_vectors(other, factor * own)[0].as_matrix()
+    plain = Fit(factor, turn, places.mean(0) - factor * turn @ parts.mean(0))
+    off = np.linalg.norm(plain.places(parts) - places, axis=1) / factor
+    hip = creature.frame.hip_height
+    if not (off < SLACK * hip).all():
+        worst = [list(bones)[i] for i in np.argsort(-off) if not off[i] < SLACK * hip]
+        names = _listed([creature.settings.rig.bones[part] for part in worst])
+        raise UserError(
+            f"{character.path}: at rest its bones {names} are up to {off.max() / hip:.0%} of the hip "
+            f"height off the parts of {creature.name}; name the file that was imported "
+            f"({creature.settings.rig.file}), or import this one and train it"
+        )
+    up = turn @ [0.0, 1.0, 0.0]
+    return dataclasses.replace(plain, shift=plain.shift + factor * _lowest_at_rest(loop) * up)
+
+
+def _lowest_at_rest(loop: WalkLoop) -> float:
+    """Height in m of the lowest point of the feet in the rest pose."""
+    model, data = loop.walk.creature.model, mujoco.MjData(loop.walk.creature.model)
+    data.qpos[:] = resting(loop)
+    mujoco.mj_kinematics(model, data)
+    return min(-geom_reach(model, data, geom, DOWN) for geom in loop.walk.creature.feet.stepping)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Goal:
+    """Transforms [F, 4, 4] of a node in the scene. free: whether its place is animated too."""
+
+    world: np.ndarray
+    free: bool
+
+
+def _goals(
+    loop: WalkLoop, character: Character, bones: Mapping[str, int], fit: Fit, travelling: bool
+) -> dict[int, Goal]:
+    """Goals by node.
+
+    Below another bone, a bone keeps its own place against it, which is more exact than the part's.
+    """
+    creature = loop.walk.creature
+    skeleton, axes = skeleton_of(creature.model, creature.trunk), gltf_axes(loop.walk.forward)
+    _, still = world_poses(creature.model, skeleton, resting(loop)[None], axes)
+    pos, rot = walked(loop, skeleton, axes, travelling)
+    turned = fit.turns(rot @ still.transpose(0, 1, 3, 2))
+    goals = {}
+    for part, node in bones.items():
+        at = skeleton.names.index(part, 1)  # the first is the root on the floor
+        world = np.tile(character.world[node], (len(pos), 1, 1))
+        world[:, :3, :3] = turned[:, at] @ world[:, :3, :3]
+        world[:, :3, 3] = fit.places(pos[:, at])
+        free = not any(above in bones.values() for above in character.above(node))
+        goals[node] = Goal(world, free)
+    top = _root_bone(character, bones[creature.model.body(creature.trunk).name], goals)
+    if travelling and top is not None:
+        world = np.tile(character.world[top], (len(pos), 1, 1))
+        world[:, :3, :3] = turned[:, 0] @ world[:, :3, :3]
+        away = world[:, :3, 3] - fit.shift
+        world[:, :3, 3] = fit.places(pos[:, 0]) + (turned[:, 0] @ away[..., None])[..., 0]
+        goals[top] = Goal(world, True)
+    return goals
+
+
+def _root_bone(character: Character, trunk: int, goals: Mapping[int, Goal]) -> int | None:
+    """The topmost bone above the trunk's, which engines take for the root; None without one."""
+    joints = {node for nodes in character.bones.values() for node in nodes} - set(goals)
+    return next((node for node in reversed(character.above(trunk)) if node in joints), None)
+
+
+Track = tuple[str, np.ndarray]
+"""Path of a channel, and its values: translations [F, 3] or quaternions [F, 4]."""
+
+
+def _tracks(character: Character, goals: Mapping[int, Goal]) -> dict[int, list[Track]]:
+    """The channels that move, by node; all other nodes rest against their parents."""
+    frames = len(next(iter(goals.values())).world)
+    world = np.zeros((frames, len(character.nodes), 4, 4))
+    tracks: dict[int, list[Track]] = {}
+    for node in character.order:
+        parent = character.parents[node]
+        above = world[:, parent] if parent >= 0 else np.tile(np.eye(4), (frames, 1, 1))
+        local = np.tile(character.local[node], (frames, 1, 1))
+        if node in goals:
+            _check_scale(character, node)
+            own = np.linalg.solve(above, goals[node].world)
+            local[:, :3, :3] = own[:, :3, :3]
+            if goals[node].free:
+                local[:, :3, 3] = own[:, :3, 3]
+            tracks[node] = _moving(character, node, local)
+        world[:, node] = above @ local
+    return {node: found for node, found in tracks.items() if found}
+
+
+def _check_scale(character: Character, node: int) -> None:
+    """Refuse a bone that would be sheared, which key frames cannot express."""
+    for place in (node, character.parents[node]):
+        if place < 0:
+            continue
+        # A bone itself may be scaled along its own axes.
+        axes = (character.local if place == node else character.world)[place, :3, :3]
+        square = axes.T @ axes
+        size = np.diag(square) if place == node else np.full(3, np.trace(square) / 3)
+        if np.abs(square - np.diag(size)).max() > EVEN * size.max():
+            name = name_of(character.nodes, place)
+            raise UserError(
+                f'{character.path}: "{name}" has another scale along each axis, so what is below it '
+                "cannot turn; apply its scale in your program, and export the file again"
+            )
+
+
+def _moving(character: Character, node: int, local: np.ndarray) -> list[Track]:
+    """The channels of a node with transforms [F, 4, 4] against its parent, if it moves."""
+    place, quat, _ = character.split(node)
+    back = np.linalg.inv(character.local[node, :3, :3]) @ Rotation.from_quat(quat).as_matrix()
+    quats = quaternions(local[:, :3, :3] @ back)
+    quats *= np.copysign(1.0, quats[0] @ quat)
+    tracks: list[Track] = [("rotation", quats)] if np.abs(quats - quat).max() > STILL else []
+    if np.abs(local[:, :3, 3] - place).max() > STILL:
+        tracks.append(("translation", local[:, :3, 3]))
+    return tracks
+
+
+def _finished(
+    loop: WalkLoop,
+    character: Character,
+    bones: Mapping[str, int],
+    fit: Fit,
+    tracks: Mapping[int, list[Track]],
+    travelling: bool,
+) -> tuple[str, bytes]:
+    """The name of the animation, and the bytes of the file."""
+    document = gltf.GLTF2()
+    buffer = Buffer(document)
+    names = (f"walk_{i}{LOOP}" if i > 1 else f"walk{LOOP}" for i in itertools.count(1))
+    animation = gltf.Animation(name=next(name for name in names if name not in character.clips))
+    times = buffer.add(loop.times.astype(np.float32), bounds=True)
+    for node, found in tracks.items():
+        for path, values in found:
+            target = gltf.AnimationChannelTarget(node=node, path=path)
+            sampler = len(animation.samplers)
+            animation.channels.append(gltf.AnimationChannel(sampler=sampler, target=target))
+            output = buffer.add(values.astype(np.float32))
+            animation.samplers.append(
+                gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
+            )
+    names_of = {part: name_of(character.nodes, node) for part, node in bones.items()}
+    feet = [names_of.get(foot, foot) for foot in loop.walk.creature.feet.names]
+    animation.extras = {
+        "strides": loop.strides,
+        "speed_m_per_s": fit.factor * loop.speed,
+        "frames_per_s": loop.rate,
+        "travelling": travelling,
+        "contacts": contacts(loop, feet),
+    }
+    document.animations.append(animation)
+    # glTF allows no key frames for a node that is placed by a matrix.
+    nodes = {node: _unmatrixed(character, node) for node in tracks if character.nodes[node].matrix}
+    return animation.name, added(character.data, buffer, nodes)
+
+
+def _unmatrixed(character: Character, node: int) -> dict[str, object]:
+    """Keys of a node placed by translation, rotation and scale instead of its matrix."""
+    keys = ("translation", "rotation", "scale")
+    split = zip(keys, character.split(node), strict=True)
+    return {"matrix": None} | {key: values.tolist() for key, values in split}
