@@ -11,19 +11,23 @@ from mjxgait.errors import UserError
 
 if TYPE_CHECKING:
     from mjxgait.animation.export import Character, WalkLoop
+    from mjxgait.rendering.walk import Walk
 
-KINDS = (".glb", ".bvh", ".usda", ".usdc")
+KINDS = (".glb", ".bvh", ".usda", ".usdc", ".csv", ".json")
+NUMBERS = (".csv", ".json")
 
 
 @dataclasses.dataclass(frozen=True)
 class ExportOptions:
     """Write the champion's walk as a seamless loop: a skinned GLB or USD, or a BVH skeleton.
 
-    Units m, Y up, forward +Z.
+    Units m, Y up, forward +Z. Or write all of it as numbers for a robot, Z up: base, joints,
+    targets, torques and contacts at every control step (docs/guide/seeing.md).
 
     Attributes:
       run: Run folder.
-      out: File to write, ending with .glb, .bvh, .usda or .usdc.
+      out: File to write, ending with .glb, .bvh, .usda or .usdc; .csv or .json for
+        numbers.
       onto: The character (GLB) that the creature was imported from; the file gets the walk as one
         more animation of it, in its own axes and units.
       rate: Key frames per second.
@@ -49,17 +53,31 @@ def export_command(arguments: Sequence[str]) -> int:
     require_writable(options.out)
     character = None if options.onto is None else read_character(options.onto)
     walk = champion_of(options.run, LOOP_SECONDS).walk
-    loop = walk_loop(walk, options.rate)
-    called = _write(loop, character, options.out, options.travelling)
-    size = options.out.stat().st_size / 1024
-    strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
-    print(
-        f"{options.out} ({size:,.0f} KiB): {called}{strides}, {loop.times[-1]:.2f} s at {loop.rate} "
-        f"frames/s, {loop.speed:.2f} m/s"
+    said = (
+        _numbers(walk, options.out)
+        if options.out.suffix.lower() in NUMBERS
+        else _animation(walk_loop(walk, options.rate), character, options.out, options.travelling)
     )
+    print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB): {said}")
     if said := doubt(options.run, walk):
         print(said)
     return 0
+
+
+def _numbers(walk: "Walk", out: Path) -> str:
+    """Write the walk as numbers; return what was written."""
+    from mjxgait.animation.export.motion import export_motion
+
+    export_motion(walk, out)
+    return f"{walk.seconds:.2f} s at {1 / walk.time_step:.0f} Hz"
+
+
+def _animation(loop: "WalkLoop", character: "Character | None", out: Path, travelling: bool) -> str:
+    """Write the loop; return what was written."""
+    called = _write(loop, character, out, travelling)
+    strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
+    seconds, rate, speed = loop.times[-1], loop.rate, loop.speed
+    return f"{called}{strides}, {seconds:.2f} s at {rate} frames/s, {speed:.2f} m/s"
 
 
 def _check_names(out: Path, onto: Path | None) -> None:

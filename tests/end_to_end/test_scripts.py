@@ -14,7 +14,9 @@ from end_to_end.shipped import BENCHMARKS, FEW_BLOCKS, ROOT, SCRIPTS, TINY
 from end_to_end.walks import faller, short_examination, trained, walker
 from helpers import STOOL
 
+from mjxgait.animation.export.motion import export_motion
 from mjxgait.processes import python_command
+from mjxgait.rendering.walk import record_walk
 from mjxgait.training import (
     checkpoint,
     examination,
@@ -23,6 +25,7 @@ from mjxgait.training import (
     stages,
 )
 from mjxgait.training import examination as looks
+from mjxgait.training.folder import open_champion
 
 BLENDER = "needs Blender as a module of Python"
 RAY = "needs Ray; tests/distributed/test_ray.py runs what it measures, where Ray is installed"
@@ -58,6 +61,17 @@ COSTS = {
 def on_paper(folder: Path) -> list[str]:
     (folder / "costs.json").write_text(json.dumps(COSTS))
     return ["costs.json"]
+
+
+def played(folder: Path) -> list[str]:
+    run = ROOT / "docs" / "data" / "walk"
+    export_motion(record_walk(*open_champion(run), 1.0), folder / "motion.json")
+    return [
+        str(folder / "motion.json"),
+        str(run / "creature" / "creature.xml"),
+        "--seconds",
+        "0.5",
+    ]
 
 
 FORMS: dict[str, Given] = {
@@ -102,6 +116,7 @@ FORMS: dict[str, Given] = {
     "ablate.py": lambda folder: ["null", "--dry-run"],
     "filmstrips.py": lambda folder: [str(certified(folder / "run"))],
     "inspect_checkpoint.py": lambda folder: [str(trained(folder / "run"))],
+    "play_motion.py": played,
     "portraits.py": lambda folder: [str(walker(folder / "run"))],
     "store_walk.py": lambda folder: [str(ROOT / "docs" / "data" / "walk")],
     "train.py": lambda folder: [*STOOLS, *TINY, "--out", "run"],
