@@ -122,14 +122,14 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     place_bodies(model, anatomy)
     joints = add_joints(model, anatomy, source.efforts, notes)
     feet = [anatomy.bodies.index(b) for b in anatomy.feet]
-    puppet = KinematicModel(anatomy.spec, feet, *joints, in_plane(model, anatomy.root))
-    start = first_pose(puppet, model, anatomy)
-    puppet.turn(yaw_to(find_forward(puppet, start, choices.forward, notes)))
-    rest = puppet.qpos(np.zeros(len(puppet.joints))) if source.up else None
-    planar = is_planar(puppet, start) is not None
-    mirror = find_mirror(puppet, start, planar, notes)
+    kinematics = KinematicModel(anatomy.spec, feet, *joints, in_plane(model, anatomy.root))
+    start = first_pose(kinematics, model, anatomy)
+    kinematics.turn(yaw_to(find_forward(kinematics, start, choices.forward, notes)))
+    rest = kinematics.qpos(np.zeros(len(kinematics.joints))) if source.up else None
+    planar = is_planar(kinematics, start) is not None
+    mirror = find_mirror(kinematics, start, planar, notes)
     best = standing(
-        puppet, offered_poses(puppet, model, anatomy, source, start), mirror, planar, notes
+        kinematics, offered_poses(kinematics, model, anatomy, source, start), mirror, planar, notes
     )
     if best.held.height < 0:
         raise UserError(
@@ -137,7 +137,9 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
             "falls through: this has no legs to walk on"
         )
     soles = {name for foot in best.feet for name in foot}
-    steady_balance(best.drive, best.puppet.names, best.puppet.model, best.qpos, soles, best.notes)
+    steady_balance(
+        best.drive, best.kinematics.names, best.kinematics.model, best.qpos, soles, best.notes
+    )
     name = plain_names([choices.name or path.stem], ["creature"])[0].strip(".-") or "creature"
     if rest is not None:
         rest[:3] = best.qpos[:3]
@@ -197,22 +199,22 @@ def _folder(
 
     rest: [nq] rest pose of a skeleton, None for other models. bones: its bones by part.
     """
-    puppet, notes = best.puppet, best.notes
-    notes.guess("trunk", puppet.bodies[0].name, "high", "the body that all limbs hang on")
+    kinematics, notes = best.kinematics, best.notes
+    notes.guess("trunk", kinematics.bodies[0].name, "high", "the body that all limbs hang on")
     notes.guess(
         "feet",
         f"{len(best.feet)} feet",
         "high" if math.isfinite(best.held.up) and best.held.stands else "low",
         "limbs that end lowest",
     )
-    pairs = {} if mirror is None else _stated_pairs(puppet, best.q, mirror, planar)
-    if stopped := [joint.name for joint in puppet.joints if joint.limited == 1]:
+    pairs = {} if mirror is None else _stated_pairs(kinematics, best.q, mirror, planar)
+    if stopped := [joint.name for joint in kinematics.joints if joint.limited == 1]:
         notes.change(
             f"limits act on {listed(stopped)} only",
             "these stand at the end of their range and rest on it",
         )
-    puppet.pose(best.q)
-    passing = planar and bool(geometry.parallel(puppet.data.xaxis[1:]).all())
+    kinematics.pose(best.q)
+    passing = planar and bool(geometry.parallel(kinematics.data.xaxis[1:]).all())
     hip, length = _sizes(best)
     shorter = length < hip
     if shorter:
@@ -237,7 +239,7 @@ def _folder(
         f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
     )
     files = {
-        XML: creature_xml(puppet.spec, name, best.qpos, rest),
+        XML: creature_xml(kinematics.spec, name, best.qpos, rest),
         TOML: toml,
         README: report,
     }
@@ -245,7 +247,7 @@ def _folder(
 
 
 def _stated_pairs(
-    puppet: KinematicModel, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray], planar: bool
+    kinematics: KinematicModel, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray], planar: bool
 ) -> dict[str, tuple[str, int]]:
     """Partner and sign of each joint that the geometry alone does not determine.
 
@@ -253,28 +255,28 @@ def _stated_pairs(
     coincide.
     """
     partner, sign = mirror
-    found, turned = puppet.images(np.array([1.0, 0.0, 0.0]), q, slack=0.5)
+    found, turned = kinematics.images(np.array([1.0, 0.0, 0.0]), q, slack=0.5)
     known = (found == partner) & (turned == sign) & (not planar)
     return {
-        name: (puppet.names[partner[j]], int(sign[j]))
-        for j, name in enumerate(puppet.names)
+        name: (kinematics.names[partner[j]], int(sign[j]))
+        for j, name in enumerate(kinematics.names)
         if not known[j]
     }
 
 
 def _sizes(best: Candidate) -> tuple[float, float]:
     """Hip height and body length in m in the standing pose."""
-    model, data = best.puppet.model, mujoco.MjData(best.puppet.model)
+    model, data = best.kinematics.model, mujoco.MjData(best.kinematics.model)
     data.qpos[:] = best.qpos
     mujoco.mj_kinematics(model, data)
     length = geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
-    return stance_of(best.puppet, best.qpos[7:]).hip, length
+    return stance_of(best.kinematics, best.qpos[7:]).hip, length
 
 
 def _train(best: Candidate, symmetric: bool, hip: float, length: float) -> Settings:
     """Return the table `[train]`. hip, length: m, of the hip height and the body."""
-    puppet, steps = best.puppet, bool(best.drive.ahead or best.drive.aside)
-    step, mass = float(puppet.model.opt.timestep), puppet.mass
-    rotor = float(np.median([joint.armature for joint in puppet.joints]))
-    legs, hinges = len(puppet.feet), len(puppet.joints)
+    kinematics, steps = best.kinematics, bool(best.drive.ahead or best.drive.aside)
+    step, mass = float(kinematics.model.opt.timestep), kinematics.mass
+    rotor = float(np.median([joint.armature for joint in kinematics.joints]))
+    legs, hinges = len(kinematics.feet), len(kinematics.joints)
     return manner(steps, legs, hinges, symmetric, hip, length, mass, step, rotor, best.notes)

@@ -89,12 +89,12 @@ class Drive:
 
 
 def plan_drive(
-    puppet: KinematicModel, q: np.ndarray, stance: Stance, planar: bool, notes: Notes
+    kinematics: KinematicModel, q: np.ndarray, stance: Stance, planar: bool, notes: Notes
 ) -> Drive:
     """Plan the drive of a body that faces +x in its standing pose [J]."""
-    feet = len(puppet.feet)
-    roles, moves = _roles(puppet, q, stance)
-    weight, inertia = puppet.mass * GRAVITY * stance.hip, _own_inertia(puppet)
+    feet = len(kinematics.feet)
+    roles, moves = _roles(kinematics, q, stance)
+    weight, inertia = kinematics.mass * GRAVITY * stance.hip, _own_inertia(kinematics)
     quick = QUICKNESS**2 * GRAVITY / stance.hip * inertia
     kp = np.maximum(
         weight * float(np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS)), quick
@@ -103,14 +103,14 @@ def plan_drive(
     own = np.maximum(
         weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH)), SWING * quick
     )
-    stated = puppet.effort
+    stated = kinematics.effort
     # The file's torque is used where it is plausible for a walk: 0 and 1000 N·m often mean
     # "unknown".
     torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)
-    drive = Drive(roles, kp, kd, torque, _ranges(puppet, q, roles))
-    _bend_one_way(puppet, q, drive, notes)
-    _add_armature(puppet, drive, inertia, notes)
-    reason = f"weight {puppet.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
+    drive = Drive(roles, kp, kd, torque, _ranges(kinematics, q, roles))
+    _bend_one_way(kinematics, q, drive, notes)
+    _add_armature(kinematics, drive, inertia, notes)
+    reason = f"weight {kinematics.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
     reason += "; more where a joint's own inertia needs it" if (kp == quick).any() else ""
     notes.guess("kp, kd", f"{np.median(kp):.3g}, {np.median(kd):.3g}", "medium", reason)
     used = np.isfinite(stated) & (torque == stated)
@@ -120,32 +120,32 @@ def plan_drive(
         "range", "by what each joint does", "low", "40 degrees and less, within the file's limits"
     )
     if not planar:
-        _steering(puppet, stance, drive, moves)
-    _balance(puppet, stance, drive, moves, planar)
-    if _must_step(puppet, stance):
-        _stepping(puppet, stance, drive, moves, planar)
+        _steering(kinematics, stance, drive, moves)
+    _balance(kinematics, stance, drive, moves, planar)
+    if _must_step(kinematics, stance):
+        _stepping(kinematics, stance, drive, moves, planar)
     return drive
 
 
-def _own_inertia(puppet: KinematicModel) -> np.ndarray:
+def _own_inertia(kinematics: KinematicModel) -> np.ndarray:
     """Inertia [J] kg m² that each joint moves when the body floats free in the latest pose.
 
     It includes the armature.
     """
-    mujoco.mj_forward(puppet.model, puppet.data)
-    mass = np.zeros((puppet.model.nv, puppet.model.nv))
-    mujoco.mj_fullM(puppet.model, puppet.data, mass)
+    mujoco.mj_forward(kinematics.model, kinematics.data)
+    mass = np.zeros((kinematics.model.nv, kinematics.model.nv))
+    mujoco.mj_fullM(kinematics.model, kinematics.data, mass)
     return 1 / np.diag(np.linalg.inv(mass))[6:]
 
 
-def _add_armature(puppet: KinematicModel, drive: Drive, own: np.ndarray, notes: Notes) -> None:
+def _add_armature(kinematics: KinematicModel, drive: Drive, own: np.ndarray, notes: Notes) -> None:
     """Raise the armature of light joints so that stable PD can hold the weight with them.
 
     own: [J] inertia. The added armature is like the rotor of a motor of that strength.
     """
-    least = LEAST_INERTIA * puppet.model.opt.timestep * drive.kd
+    least = LEAST_INERTIA * kinematics.model.opt.timestep * drive.kd
     raised = []
-    for joint, has, wants in zip(puppet.joints, own, least, strict=True):
+    for joint, has, wants in zip(kinematics.joints, own, least, strict=True):
         if has < wants:
             joint.armature += float(wants - has)
             raised.append(joint.name)
@@ -156,18 +156,20 @@ def _add_armature(puppet: KinematicModel, drive: Drive, own: np.ndarray, notes: 
         )
 
 
-def _roles(puppet: KinematicModel, q: np.ndarray, stance: Stance) -> tuple[list[str], np.ndarray]:
+def _roles(
+    kinematics: KinematicModel, q: np.ndarray, stance: Stance
+) -> tuple[list[str], np.ndarray]:
     """Role of each joint, and the mean motion [J, 3] m/rad that it gives its feet."""
-    soles = puppet.sole_points(*puppet.pose(q))
+    soles = kinematics.sole_points(*kinematics.pose(q))
     middles = [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * stance.hip].mean(0) for sole in soles]
-    moves = np.array([puppet.jacobian(f, middle) for f, middle in enumerate(middles)])
+    moves = np.array([kinematics.jacobian(f, middle) for f, middle in enumerate(middles)])
     carried = np.abs(moves).sum(2) > 0
     mean = moves.sum(0) / np.maximum(carried.sum(0), 1)[:, None]
-    axes = np.abs(puppet.data.xaxis[1:])
+    axes = np.abs(kinematics.data.xaxis[1:])
     roles = []
     for j in range(len(q)):
         size = float(np.linalg.norm(mean[j]))
-        legs = [f for f in range(len(puppet.feet)) if j in puppet.leg(f)]
+        legs = [f for f in range(len(kinematics.feet)) if j in kinematics.leg(f)]
         if not legs:
             roles.append("other")
         elif len(legs) > 1:
@@ -178,35 +180,39 @@ def _roles(puppet: KinematicModel, q: np.ndarray, stance: Stance) -> tuple[list[
             roles.append(
                 ROLES[int((np.abs(mean[j]) * [1.3, 1.0, 1.0]).argmax())]
             )  # a tie is a stride
-    chains = [puppet.leg(f) for f in range(len(puppet.feet))]
+    chains = [kinematics.leg(f) for f in range(len(kinematics.feet))]
     for leg in chains if len(chains) > 1 else []:
         for j in [j for j in leg if roles[j] in ("stride", "lift")][SWINGING:]:
             roles[j] = "distal"
     return roles, mean
 
 
-def _ranges(puppet: KinematicModel, q: np.ndarray, roles: list[str]) -> np.ndarray:
+def _ranges(kinematics: KinematicModel, q: np.ndarray, roles: list[str]) -> np.ndarray:
     """Ranges [J, 2] deg about the standing angle, within the limits."""
     half = np.array([RANGES[role] for role in roles])
-    low = np.maximum(-half, np.degrees(np.where(np.isfinite(puppet.low), puppet.low, -1e3) - q))
-    high = np.minimum(half, np.degrees(np.where(np.isfinite(puppet.high), puppet.high, 1e3) - q))
+    low = np.maximum(
+        -half, np.degrees(np.where(np.isfinite(kinematics.low), kinematics.low, -1e3) - q)
+    )
+    high = np.minimum(
+        half, np.degrees(np.where(np.isfinite(kinematics.high), kinematics.high, 1e3) - q)
+    )
     return np.stack([np.minimum(low, 0.0), np.maximum(high, 0.0)], 1)
 
 
-def _bend_one_way(puppet: KinematicModel, q: np.ndarray, drive: Drive, notes: Notes) -> None:
+def _bend_one_way(kinematics: KinematicModel, q: np.ndarray, drive: Drive, notes: Notes) -> None:
     """Keep a knee without stated limits on the side to which it is bent in the stance."""
     sided = []
-    soles = puppet.sole_points(*puppet.pose(q))
+    soles = kinematics.sole_points(*kinematics.pose(q))
     for f, sole in enumerate(soles):
-        leg = puppet.leg(f)
-        path = np.concatenate([puppet.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]])
+        leg = kinematics.leg(f)
+        path = np.concatenate([kinematics.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]])
         parts = np.diff(path, axis=0)
         sizes = np.linalg.norm(parts, axis=1)
         if len(sizes) < 2:
             continue
         k = int((sizes[:-1] + sizes[1:]).argmax())
-        knee, axis = leg[k + 1], puppet.data.xaxis[leg[k + 1] + 1]
-        if puppet.high[knee] - puppet.low[knee] < ENDLESS:
+        knee, axis = leg[k + 1], kinematics.data.xaxis[leg[k + 1] + 1]
+        if kinematics.high[knee] - kinematics.low[knee] < ENDLESS:
             continue
         thigh, shank = parts[k], parts[k + 1]
         straight = np.degrees(np.arctan2(axis @ np.cross(shank, thigh), shank @ thigh))
@@ -216,7 +222,7 @@ def _bend_one_way(puppet: KinematicModel, q: np.ndarray, drive: Drive, notes: No
         low, high = drive.ranges[knee]
         drive.ranges[knee] = (low, min(high, end)) if straight > 0 else (max(low, end), high)
         if (drive.ranges[knee] != (low, high)).any():
-            sided.append(puppet.names[knee])
+            sided.append(kinematics.names[knee])
     if sided:
         notes.guess(
             "side of knees",
@@ -226,76 +232,80 @@ def _bend_one_way(puppet: KinematicModel, q: np.ndarray, drive: Drive, notes: No
         )
 
 
-def _steering(puppet: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
+def _steering(kinematics: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
     """Set the steering weights: left legs stride longer, and a spine joint bends about z."""
-    for f in range(len(puppet.feet)):
-        side = float(puppet.data.xpos[puppet.feet[f][0] + 1][1])
-        own = [j for j in puppet.leg(f) if drive.role[j] == "stride"]
+    for f in range(len(kinematics.feet)):
+        side = float(kinematics.data.xpos[kinematics.feet[f][0] + 1][1])
+        own = [j for j in kinematics.leg(f) if drive.role[j] == "stride"]
         if own and abs(side) > 0.02 * stance.hip:
-            drive.stride[puppet.names[own[0]]] = 0.5 if side > 0 else -0.5
+            drive.stride[kinematics.names[own[0]]] = 0.5 if side > 0 else -0.5
     spine = [
         j
         for j, role in enumerate(drive.role)
-        if role == "spine" and abs(puppet.data.xaxis[j + 1][2]) > UPRIGHT
+        if role == "spine" and abs(kinematics.data.xaxis[j + 1][2]) > UPRIGHT
     ]
-    behind = [j for j in spine if puppet.data.xanchor[j + 1][0] < puppet.data.xpos[1][0]]
+    behind = [j for j in spine if kinematics.data.xanchor[j + 1][0] < kinematics.data.xpos[1][0]]
     if behind:
         # Positive yaw about -z swings the hind part to the left, which curves the body to the
         # right.
-        drive.bend[puppet.names[behind[0]]] = 0.5 * float(
-            np.sign(puppet.data.xaxis[behind[0] + 1][2])
+        drive.bend[kinematics.names[behind[0]]] = 0.5 * float(
+            np.sign(kinematics.data.xaxis[behind[0] + 1][2])
         )
 
 
-def _must_step(puppet: KinematicModel, stance: Stance) -> bool:
+def _must_step(kinematics: KinematicModel, stance: Stance) -> bool:
     """Return whether the body stands on one foot in each step: at most two feet, side by side."""
-    ahead = [puppet.data.xpos[group[0] + 1][0] for group in puppet.feet]
-    return len(puppet.feet) <= STEPPERS and bool(np.ptp(ahead) < APART * stance.hip)
+    ahead = [kinematics.data.xpos[group[0] + 1][0] for group in kinematics.feet]
+    return len(kinematics.feet) <= STEPPERS and bool(np.ptp(ahead) < APART * stance.hip)
 
 
 def _stepping(
-    puppet: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
+    kinematics: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
 ) -> None:
     """Set the stepping weights.
 
     The highest joints of a leg that swing the foot forward and sideways place it under the fall.
     The highest upright joint turns it.
     """
-    for f in range(len(puppet.feet)):
+    for f in range(len(kinematics.feet)):
         for role, axis, table in (("stride", 0, drive.ahead), ("side", 1, drive.aside)):
             if role == "side" and planar:
                 continue
-            way = {j: float(moves[j][axis]) / stance.hip for j in puppet.leg(f)}
+            way = {j: float(moves[j][axis]) / stance.hip for j in kinematics.leg(f)}
             own = [j for j in way if drive.role[j] == role and abs(way[j]) > WEAKEST]
             if own:
-                table[puppet.names[own[0]]] = round(1 / way[own[0]], 3)
-        shared = {j for other in range(len(puppet.feet)) if other != f for j in puppet.leg(other)}
-        upright = {j: float(puppet.data.xaxis[j + 1][2]) for j in puppet.leg(f) if j not in shared}
+                table[kinematics.names[own[0]]] = round(1 / way[own[0]], 3)
+        shared = {
+            j for other in range(len(kinematics.feet)) if other != f for j in kinematics.leg(other)
+        }
+        upright = {
+            j: float(kinematics.data.xaxis[j + 1][2]) for j in kinematics.leg(f) if j not in shared
+        }
         if turns := [j for j in upright if abs(upright[j]) > UPRIGHT]:
-            drive.turn[puppet.names[turns[0]]] = float(np.sign(upright[turns[0]]))
+            drive.turn[kinematics.names[turns[0]]] = float(np.sign(upright[turns[0]]))
 
 
 def _balance(
-    puppet: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
+    kinematics: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
 ) -> None:
     """Set the balance weights.
 
     Nose down: front feet push down, hind feet give way, toes press. Right side down: the feet move
     right, under the fall.
     """
-    middle = np.mean([puppet.data.xpos[g[0] + 1][0] for g in puppet.feet])
-    for f, group in enumerate(puppet.feet):
-        leg, ahead = puppet.leg(f), float(puppet.data.xpos[group[0] + 1][0] - middle)
+    middle = np.mean([kinematics.data.xpos[g[0] + 1][0] for g in kinematics.feet])
+    for f, group in enumerate(kinematics.feet):
+        leg, ahead = kinematics.leg(f), float(kinematics.data.xpos[group[0] + 1][0] - middle)
         sides = [j for j in leg if drive.role[j] == "side"]
         if sides and not planar:
-            drive.roll[puppet.names[sides[0]]] = -float(np.sign(moves[sides[0]][1]))
+            drive.roll[kinematics.names[sides[0]]] = -float(np.sign(moves[sides[0]][1]))
         ankles = [j for j in leg if drive.role[j] == "ankle"]
-        if len(puppet.feet) <= 2 and ankles:
-            drive.pitch[puppet.names[ankles[-1]]] = float(
-                np.sign(puppet.data.xaxis[ankles[-1] + 1][1])
+        if len(kinematics.feet) <= 2 and ankles:
+            drive.pitch[kinematics.names[ankles[-1]]] = float(
+                np.sign(kinematics.data.xaxis[ankles[-1] + 1][1])
             )
         elif abs(ahead) > 0.2 * stance.hip:
             own = [j for j in leg if drive.role[j] in ("lift", "stride")]
             if own:
                 j = max(own, key=lambda j: abs(float(moves[j][2])))
-                drive.pitch[puppet.names[j]] = -float(np.sign(moves[j][2]) * np.sign(ahead))
+                drive.pitch[kinematics.names[j]] = -float(np.sign(moves[j][2]) * np.sign(ahead))

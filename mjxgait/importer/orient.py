@@ -45,15 +45,15 @@ def yaw_to(forward: np.ndarray) -> np.ndarray:
 
 
 def find_forward(
-    puppet: KinematicModel, q: np.ndarray, told: str | None, notes: Notes
+    kinematics: KinematicModel, q: np.ndarray, told: str | None, notes: Notes
 ) -> np.ndarray:
     """Forward unit vector [3] in the world of the pose."""
-    xpos, _ = puppet.pose(q)
+    xpos, _ = kinematics.pose(q)
     if told:
         notes.guess("forward", told, "high", "as given")
         return FORWARDS[told]
-    name, sure, why = _axis(puppet, q)
-    sign, evidence = _front(puppet, xpos, FORWARDS[name])
+    name, sure, why = _axis(kinematics, q)
+    sign, evidence = _front(kinematics, xpos, FORWARDS[name])
     if sign < 0:
         name = f"-{name}"
     notes.guess(
@@ -65,14 +65,14 @@ def find_forward(
     return FORWARDS[name]
 
 
-def _axis(puppet: KinematicModel, q: np.ndarray) -> tuple[str, Confidence, str]:
+def _axis(kinematics: KinematicModel, q: np.ndarray) -> tuple[str, Confidence, str]:
     """Walking axis (x or y), its confidence and the reason."""
-    axes = puppet.data.xaxis[1:]
-    if is_planar(puppet, q) is not None:
+    axes = kinematics.data.xaxis[1:]
+    if is_planar(kinematics, q) is not None:
         lateral = int(np.abs(axes[0][:2]).argmax())
         return ("x", "y")[1 - lateral], "high", "all hinges turn about the other axis"
-    alike = {name: _two_sided(puppet, FORWARDS[name], q) for name in ("x", "y")}
-    along_x, along_y = swings(puppet, q)
+    alike = {name: _two_sided(kinematics, FORWARDS[name], q) for name in ("x", "y")}
+    along_x, along_y = swings(kinematics, q)
     name, other = ("x", "y") if along_x >= along_y else ("y", "x")
     farther = max(along_x, along_y) / max(min(along_x, along_y), 1e-9)
     swung = f"the hinges swing the feet {min(farther, 99):.1f} times as far along {name}"
@@ -81,7 +81,7 @@ def _axis(puppet: KinematicModel, q: np.ndarray) -> tuple[str, Confidence, str]:
             return name, "high" if alike["x"] else "medium", swung
         if alike["x"]:
             return "x", "low", "symmetry and hinges are as good along y; x is the convention"
-        spread = np.ptp(puppet.data.xpos[1:], axis=0)
+        spread = np.ptp(kinematics.data.xpos[1:], axis=0)
         name = "x" if spread[0] >= 0.8 * spread[1] else "y"
         return name, "low", "no plane of symmetry was found; the longer side"
     if farther > MOSTLY and not alike[name]:
@@ -89,48 +89,48 @@ def _axis(puppet: KinematicModel, q: np.ndarray) -> tuple[str, Confidence, str]:
     return ("x" if alike["x"] else "y"), "high", "the body is its own mirror image about it"
 
 
-def _two_sided(puppet: KinematicModel, forward: np.ndarray, q: np.ndarray) -> bool:
+def _two_sided(kinematics: KinematicModel, forward: np.ndarray, q: np.ndarray) -> bool:
     """Return whether the left and right sides mirror each other.
 
     A biped seen from the side also equals its mirror image, but there each leg is its own partner.
     """
-    found = puppet.mirror(forward, q)
+    found = kinematics.mirror(forward, q)
     return found is not None and bool((found[0] != np.arange(len(found[0]))).any())
 
 
-def swings(puppet: KinematicModel, q: np.ndarray) -> tuple[float, float]:
+def swings(kinematics: KinematicModel, q: np.ndarray) -> tuple[float, float]:
     """Foot swing in m along x and along y, summed over the hinges of the legs."""
-    soles = puppet.sole_points(*puppet.pose(q))
-    width = np.minimum(puppet.high - puppet.low, WIDEST)[:, None]
+    soles = kinematics.sole_points(*kinematics.pose(q))
+    width = np.minimum(kinematics.high - kinematics.low, WIDEST)[:, None]
     ways = [
-        np.abs(puppet.jacobian(f, sole[sole[:, 2].argmin()])) * width
+        np.abs(kinematics.jacobian(f, sole[sole[:, 2].argmin()])) * width
         for f, sole in enumerate(soles)
     ]
     x, y, _ = np.sum(ways, axis=(0, 1))
     return float(x), float(y)
 
 
-def _front(puppet: KinematicModel, xpos: np.ndarray, axis: np.ndarray) -> tuple[int, str]:
+def _front(kinematics: KinematicModel, xpos: np.ndarray, axis: np.ndarray) -> tuple[int, str]:
     """Sign of the front along the axis, and its evidence in words."""
     score = 0.0
-    for body, at in zip(puppet.bodies, xpos, strict=True):
+    for body, at in zip(kinematics.bodies, xpos, strict=True):
         score += _named_front(body.name) * float((at - xpos[0]) @ axis)
     if abs(score) > 1e-3:
         return int(np.sign(score)), "the names of front and rear parts"
-    if len(puppet.feet) > 2:
+    if len(kinematics.feet) > 2:
         return 1, ""
     # Toes reach forward from the ankle; a leg's last part that is a shank hangs back from the knee.
     toes = shanks = 0.0
-    poses = puppet.pose(puppet.data.qpos[7:])
-    for f, sole in enumerate(puppet.sole_points(*poses)):
-        anchors = puppet.data.xanchor[[j + 1 for j in puppet.leg(f)]]
+    poses = kinematics.pose(kinematics.data.qpos[7:])
+    for f, sole in enumerate(kinematics.sole_points(*poses)):
+        anchors = kinematics.data.xanchor[[j + 1 for j in kinematics.leg(f)]]
         last = sole.mean(0) - anchors[-1]
         length = np.linalg.norm(np.diff(anchors, axis=0), axis=1).sum() + np.linalg.norm(last)
         if np.linalg.norm(last) > SHANK * length:
             shanks += float(last @ axis)
         else:
             toes += float(last @ axis)
-    least = 0.02 * max(float(np.ptp(xpos[:, 2])), 1e-6) * len(puppet.feet)
+    least = 0.02 * max(float(np.ptp(xpos[:, 2])), 1e-6) * len(kinematics.feet)
     for reach, evidence in ((toes, "toes point that way"), (-shanks, "knees point that way")):
         if abs(reach) > least:
             return int(np.sign(reach)), evidence
@@ -146,51 +146,54 @@ def _named_front(name: str) -> int:
     return front - back
 
 
-def is_planar(puppet: KinematicModel, q: np.ndarray) -> np.ndarray | None:
+def is_planar(kinematics: KinematicModel, q: np.ndarray) -> np.ndarray | None:
     """Lateral axis [3] of a planar body; else None.
 
     Its hinges are all parallel and its feet lie, or are kept, in one plane.
     """
-    poses = puppet.pose(q)
-    axes = puppet.data.xaxis[1:]
+    poses = kinematics.pose(q)
+    axes = kinematics.data.xaxis[1:]
     if np.abs(axes @ axes[0]).min() < 0.99 or abs(axes[0][2]) > 0.1:
         return None
     middles = [
-        float((sole.max(0) + sole.min(0)) @ axes[0]) / 2 for sole in puppet.sole_points(*poses)
+        float((sole.max(0) + sole.min(0)) @ axes[0]) / 2 for sole in kinematics.sole_points(*poses)
     ]
     height = max(float(np.ptp(poses[0][:, 2])), 1e-6)
-    return axes[0] if np.ptp(middles) < (0.4 if puppet.in_plane else 0.05) * height else None
+    return axes[0] if np.ptp(middles) < (0.4 if kinematics.in_plane else 0.05) * height else None
 
 
-def planar_pairs(puppet: KinematicModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def planar_pairs(kinematics: KinematicModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Partner and sign [J] of a planar body with two alike legs on one hip; else None."""
-    if len(puppet.feet) != 2:
+    if len(kinematics.feet) != 2:
         return None
-    puppet.pose(q)
-    one, other = (puppet.leg(f) for f in range(2))
-    partner, sign = np.arange(len(puppet.joints)), np.ones(len(puppet.joints), dtype=int)
+    kinematics.pose(q)
+    one, other = (kinematics.leg(f) for f in range(2))
+    partner, sign = np.arange(len(kinematics.joints)), np.ones(len(kinematics.joints), dtype=int)
     own, others = [j for j in one if j not in other], [j for j in other if j not in one]
     if len(own) != len(others) or not own:
         return None
     for a, b in zip(own, others, strict=True):
-        apart = (puppet.data.xanchor[a + 1] - puppet.data.xanchor[b + 1])[[0, 2]]
-        same = puppet.low[a] == puppet.low[b] and puppet.high[a] == puppet.high[b]
+        apart = (kinematics.data.xanchor[a + 1] - kinematics.data.xanchor[b + 1])[[0, 2]]
+        same = kinematics.low[a] == kinematics.low[b] and kinematics.high[a] == kinematics.high[b]
         if (
-            np.linalg.norm(apart) > 0.05 * float(np.ptp(puppet.data.xpos[1:], axis=0).max() + 1e-6)
+            np.linalg.norm(apart)
+            > 0.05 * float(np.ptp(kinematics.data.xpos[1:], axis=0).max() + 1e-6)
             or not same
         ):
             return None
         partner[a], partner[b] = b, a
-        sign[a] = sign[b] = int(np.sign(puppet.data.xaxis[a + 1] @ puppet.data.xaxis[b + 1]))
+        sign[a] = sign[b] = int(
+            np.sign(kinematics.data.xaxis[a + 1] @ kinematics.data.xaxis[b + 1])
+        )
     return partner, sign
 
 
 def find_mirror(
-    puppet: KinematicModel, q: np.ndarray, planar: bool, notes: Notes
+    kinematics: KinematicModel, q: np.ndarray, planar: bool, notes: Notes
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Partner and sign [J] of a body that faces +x; None if it is not symmetric."""
     if planar:
-        found = planar_pairs(puppet, q)
+        found = planar_pairs(kinematics, q)
         notes.guess(
             "mirror",
             "two alike legs" if found else "none",
@@ -198,13 +201,13 @@ def find_mirror(
             "the legs of a body in a plane are compared",
         )
         return found
-    found, lone = puppet.mirror(np.array([1.0, 0, 0]), q), ""
+    found, lone = kinematics.mirror(np.array([1.0, 0, 0]), q), ""
     if found is None:
-        found, lone = _nearly_mirrored(puppet, q)
-    if found is not None and not _mirrors(puppet, q, *found):
+        found, lone = _nearly_mirrored(kinematics, q)
+    if found is not None and not _mirrors(kinematics, q, *found):
         found = None
         reason = "the joints pair up, but equal angles do not mirror the pose (their zeros differ)"
-    elif found is not None and _names_disagree(puppet.names, found[0]):
+    elif found is not None and _names_disagree(kinematics.names, found[0]):
         found = None
         reason = "the geometry and the names left and right contradict each other"
     else:
@@ -215,28 +218,28 @@ def find_mirror(
 
 
 def _nearly_mirrored(
-    puppet: KinematicModel, q: np.ndarray
+    kinematics: KinematicModel, q: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray] | None, str]:
     """Partner and sign [J] of a nearly symmetric body, and its differences in words.
 
     Joints without a mirror image pair up by name. A joint without a partner keeps its own angle in
     the mirrored half of a cycle. None if too many joints have no image.
     """
-    partner, sign = puppet.images(np.array([1.0, 0, 0]), q, ROUGHLY)
+    partner, sign = kinematics.images(np.array([1.0, 0, 0]), q, ROUGHLY)
     lone = np.flatnonzero(partner < 0)
     if len(lone) > MOST_ALONE * len(partner):
-        return None, f"{listed([puppet.names[j] for j in lone])}: without a mirror image"
-    axes = puppet.data.xaxis[1:]
+        return None, f"{listed([kinematics.names[j] for j in lone])}: without a mirror image"
+    axes = kinematics.data.xaxis[1:]
     alone = []
     for j in lone:
-        other = _other_side(puppet.names[j])
-        partner[j] = k = puppet.names.index(other) if other in puppet.names else j
+        other = _other_side(kinematics.names[j])
+        partner[j] = k = kinematics.names.index(other) if other in kinematics.names else j
         if k == j:
-            alone.append(puppet.names[j])
+            alone.append(kinematics.names[j])
             sign[j] = 1
         else:
             sign[j] = 1 if axes[j] * [-1, 1, -1] @ axes[k] >= 0 else -1
-    rough = [puppet.names[j] for j in lone if puppet.names[j] not in alone]
+    rough = [kinematics.names[j] for j in lone if kinematics.names[j] not in alone]
     said = [f"{listed(rough)} are paired by their names, not each other's image"] if rough else []
     said += (
         [f"{listed(alone)} has no partner, its angle is the same in both halves"] if alone else []
@@ -246,16 +249,18 @@ def _nearly_mirrored(
     ) or "partners found, though the sides are not quite alike"
 
 
-def _mirrors(puppet: KinematicModel, q: np.ndarray, partner: np.ndarray, sign: np.ndarray) -> bool:
+def _mirrors(
+    kinematics: KinematicModel, q: np.ndarray, partner: np.ndarray, sign: np.ndarray
+) -> bool:
     """Return whether mirrored angles give the mirrored pose, tried on a random pose.
 
     Joints beside the plane of symmetry without a partner are ignored.
     """
     trial = q + np.random.default_rng(1).uniform(-0.3, 0.3, len(q))
-    puppet.pose(trial)
-    anchors = puppet.data.xanchor[1:] - puppet.data.xpos[1]
-    puppet.pose(sign * trial[partner])
-    image = puppet.data.xanchor[1:] - puppet.data.xpos[1]
+    kinematics.pose(trial)
+    anchors = kinematics.data.xanchor[1:] - kinematics.data.xpos[1]
+    kinematics.pose(sign * trial[partner])
+    image = kinematics.data.xanchor[1:] - kinematics.data.xpos[1]
     off = np.linalg.norm(image[partner] * [1, -1, 1] - anchors, axis=1)
     most = 0.05 * float(np.ptp(anchors, axis=0).max()) + 1e-6
     lone = (partner == np.arange(len(q))) & (np.abs(anchors[:, 1]) > most)

@@ -42,37 +42,37 @@ class Stance:
 
 
 def lay_soles(
-    puppet: KinematicModel, stance: Stance, planar: bool, notes: Notes
+    kinematics: KinematicModel, stance: Stance, planar: bool, notes: Notes
 ) -> list[list[str]]:
     """Add foot geoms to the editable model, and return their names for each foot."""
     names = []
-    for group in range(len(puppet.feet)):
-        made = _sole(puppet, group, stance, planar, notes)
-        name = f"{puppet.bodies[puppet.feet[group][0]].name}_foot"
+    for group in range(len(kinematics.feet)):
+        made = _sole(kinematics, group, stance, planar, notes)
+        name = f"{kinematics.bodies[kinematics.feet[group][0]].name}_foot"
         own = [name + (f"_{n + 1}" if len(made) > 1 else "") for n in range(len(made))]
         for name, shape in zip(own, made, strict=True):
-            _put(puppet, shape, name)
+            _put(kinematics, shape, name)
         names.append(own)
     return names
 
 
-def _put(puppet: KinematicModel, shape: Shape | Bar, name: str = "") -> None:
+def _put(kinematics: KinematicModel, shape: Shape | Bar, name: str = "") -> None:
     """Let a shape touch the floor under a name."""
     if isinstance(shape, Bar):
-        shape.added(puppet.bodies[shape.body], name)
+        shape.added(kinematics.bodies[shape.body], name)
     else:
         mark(shape.geom, True, shape.seen)
         shape.geom.name = name or shape.geom.name
 
 
 def _sole(
-    puppet: KinematicModel, foot: int, stance: Stance, planar: bool, notes: Notes
+    kinematics: KinematicModel, foot: int, stance: Stance, planar: bool, notes: Notes
 ) -> list[Shape | Bar]:
     """Shapes of one foot; old shapes only stay visible."""
-    group, name = puppet.feet[foot], puppet.bodies[puppet.feet[foot][0]].name
-    solid = [tip for tip in puppet.tips[foot] if tip.far.any()]
+    group, name = kinematics.feet[foot], kinematics.bodies[kinematics.feet[foot][0]].name
+    solid = [tip for tip in kinematics.tips[foot] if tip.far.any()]
     if not solid:
-        last = puppet.bodies[group[-1]]
+        last = kinematics.bodies[group[-1]]
         notes.change(
             f'a sphere added to "{last.name}"', "the foot has no shape that could touch the floor"
         )
@@ -80,12 +80,12 @@ def _sole(
     heights = [tip_points([tip], stance.xpos, stance.xrot)[:, 2].min() for tip in solid]
     band = BAND * stance.hip
     low = [tip for tip, h in zip(solid, heights, strict=True) if h <= min(heights) + band]
-    _only_seen([s for i in group for s in puppet.shapes[i]])
+    _only_seen([s for i in group for s in kinematics.shapes[i]])
     made: list[Shape | Bar]
     if all(t.shape.kind in ROUND for t in low) and len(low) <= 4:
-        made = [_round_foot(puppet, t, stance, notes) for t in low]
+        made = [_round_foot(kinematics, t, stance, notes) for t in low]
     else:
-        made = _fitted(puppet, low, group[0], stance, band)
+        made = _fitted(kinematics, low, group[0], stance, band)
         what = " and ".join(sorted({t.shape.kind for t in low}))
         shapes = " and ".join(sorted({s.kind for s in made}))
         notes.change(
@@ -107,7 +107,7 @@ def _only_seen(shapes: list[Shape]) -> None:
         mark(s.geom, False, s.seen or (s.solid and not any(o.seen for o in shapes)))
 
 
-def _round_foot(puppet: KinematicModel, tip: Tip, stance: Stance, notes: Notes) -> Shape | Bar:
+def _round_foot(kinematics: KinematicModel, tip: Tip, stance: Stance, notes: Notes) -> Shape | Bar:
     """Return the foot shape of a sphere or capsule.
 
     A sphere or a lying capsule stays as it is. A steep capsule becomes a ball at its lower end; a
@@ -119,11 +119,11 @@ def _round_foot(puppet: KinematicModel, tip: Tip, stance: Stance, notes: Notes) 
     if shape.kind == "sphere" or (slope < STEEP and tip.far.all()):
         return shape
     lower, upper = (shape.points[[k]] for k in np.argsort(world[:, 2])[[0, -1]])
-    body = puppet.bodies[i]
+    body = kinematics.bodies[i]
     knee = body.name + UPPER_END
     count = sum(geom.name.startswith(knee) for geom in body.geoms)
     seen = not is_drawn(body)
-    _put(puppet, Bar(i, upper, shape.radius, False), knee + (f"_{count + 1}" if count else ""))
+    _put(kinematics, Bar(i, upper, shape.radius, False), knee + (f"_{count + 1}" if count else ""))
     notes.change(
         f'foot "{body.name}": the lower end of its capsule',
         "it touches the floor there; the upper end counts as a knee",
@@ -132,7 +132,7 @@ def _round_foot(puppet: KinematicModel, tip: Tip, stance: Stance, notes: Notes) 
 
 
 def _fitted(
-    puppet: KinematicModel, low: list[Tip], home: int, stance: Stance, band: float
+    kinematics: KinematicModel, low: list[Tip], home: int, stance: Stance, band: float
 ) -> list[Shape | Bar]:
     """Spheres or capsules with the footprint of the low points as their lower side."""
     world = tip_points(low, stance.xpos, stance.xrot)
@@ -142,7 +142,7 @@ def _fitted(
     low_corner, high_corner = sole.min(0)[:2], sole.max(0)[:2]
     length, width = (float(v) for v in high_corner - low_corner)
     middle = (low_corner + high_corner) / 2
-    seen = not is_drawn(puppet.bodies[home])
+    seen = not is_drawn(kinematics.bodies[home])
     least, most = 0.01 * stance.hip, max(thick / 2, 0.015 * stance.hip)
 
     def laid(radius: float, *ends: tuple[float, float]) -> Bar:
@@ -180,34 +180,34 @@ def _across(made: list[Shape | Bar], stance: Stance) -> list[Shape | Bar]:
     return wide
 
 
-def guard_parts(puppet: KinematicModel, stance: Stance, notes: Notes) -> None:
+def guard_parts(kinematics: KinematicModel, stance: Stance, notes: Notes) -> None:
     """Give all parts but the feet a few spheres and capsules; if they touch, the episode ends."""
-    on_feet = {i for group in puppet.feet for i in group}
+    on_feet = {i for group in kinematics.feet for i in group}
     lowered = []
-    for segment in puppet.segments():
+    for segment in kinematics.segments():
         if on_feet & set(segment):
             continue
-        most = MOST_TRUNK_SHAPES if segment == puppet.trunk else 1
-        owned = [s for i in segment for s in puppet.shapes[i]]
+        most = MOST_TRUNK_SHAPES if segment == kinematics.trunk else 1
+        owned = [s for i in segment for s in kinematics.shapes[i]]
         chosen = [s for s in owned if s.solid]
-        if not chosen and segment == puppet.trunk:
+        if not chosen and segment == kinematics.trunk:
             chosen = [s for s in owned if s.seen]
         chosen.sort(key=lambda s: -float(np.ptp(s.points, axis=0).max() + 2 * s.radius))
         for i in segment:
-            _only_seen(puppet.shapes[i])
+            _only_seen(kinematics.shapes[i])
         for s in chosen[:most]:
             guard = s if s.kind in ROUND else _inscribed(s)
-            name = puppet.bodies[s.body].name
+            name = kinematics.bodies[s.body].name
             if stance.clearance(guard) < NEAR_FLOOR * stance.hip:
                 lowered.append(name)
                 continue
-            _put(puppet, guard)
+            _put(kinematics, guard)
             if guard is not s:
                 notes.change(
                     f'"{name}": a {guard.kind} in place of its {s.kind}',
                     "for touching the floor",
                 )
-    for i, body in enumerate(puppet.bodies):
+    for i, body in enumerate(kinematics.bodies):
         for geom in body.geoms:  # knee balls of feet collide only if they are high enough
             if UPPER_END in geom.name:
                 ball = Bar(i, geom.pos[None], float(geom.size[0]), False)

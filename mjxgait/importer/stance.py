@@ -23,9 +23,11 @@ def symmetric(q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray] | None) -> np
     return q if mirror is None else (q + mirror[1] * q[mirror[0]]) / 2
 
 
-def level(puppet: KinematicModel, q: np.ndarray) -> None:
+def level(kinematics: KinematicModel, q: np.ndarray) -> None:
     """Tilt the trunk until the feet are level; a tilt that two feet leave open stays."""
-    lowest = np.array([sole[sole[:, 2].argmin()] for sole in puppet.sole_points(*puppet.pose(q))])
+    lowest = np.array(
+        [sole[sole[:, 2].argmin()] for sole in kinematics.sole_points(*kinematics.pose(q))]
+    )
     if len(lowest) < 2:
         return
     centred = lowest - lowest.mean(0)
@@ -39,39 +41,43 @@ def level(puppet: KinematicModel, q: np.ndarray) -> None:
     axis = np.cross(up, [0.0, 0.0, 1.0])
     sine = float(np.linalg.norm(axis))
     half = np.arcsin(min(sine, 1.0)) / 2
-    puppet.turn(rotation(np.concatenate([[np.cos(half)], np.sin(half) * axis / max(sine, 1e-9)])))
+    kinematics.turn(
+        rotation(np.concatenate([[np.cos(half)], np.sin(half) * axis / max(sine, 1e-9)]))
+    )
 
 
-def drop(puppet: KinematicModel, q: np.ndarray, sink: float = 0.0) -> None:
+def drop(kinematics: KinematicModel, q: np.ndarray, sink: float = 0.0) -> None:
     """Move the trunk over the origin, the lowest foot point on the floor or `sink` m in it."""
-    lowest = min(float(sole[:, 2].min()) for sole in puppet.sole_points(*puppet.pose(q)))
-    root = puppet.bodies[0]
+    lowest = min(float(sole[:, 2].min()) for sole in kinematics.sole_points(*kinematics.pose(q)))
+    root = kinematics.bodies[0]
     root.pos = np.array([0.0, 0.0, root.pos[2] - lowest - sink])
 
 
-def stance_of(puppet: KinematicModel, q: np.ndarray) -> Stance:
+def stance_of(kinematics: KinematicModel, q: np.ndarray) -> Stance:
     """Stance in a pose [J]; the hip height is the mean height of each leg's first joint."""
-    xpos, xrot = puppet.pose(q)
-    floor = min(float(sole[:, 2].min()) for sole in puppet.sole_points(xpos, xrot))
+    xpos, xrot = kinematics.pose(q)
+    floor = min(float(sole[:, 2].min()) for sole in kinematics.sole_points(xpos, xrot))
     shared = {
         j
-        for f in range(len(puppet.feet))
+        for f in range(len(kinematics.feet))
         for g in range(f)
-        for j in puppet.leg(f)
-        if j in puppet.leg(g)
+        for j in kinematics.leg(f)
+        if j in kinematics.leg(g)
     }
     hips = []
-    for f in range(len(puppet.feet)):
-        own = [j for j in puppet.leg(f) if j not in shared] or puppet.leg(f)
-        hips.append(max(float(puppet.data.xanchor[j + 1][2]) for j in own) - floor)
+    for f in range(len(kinematics.feet)):
+        own = [j for j in kinematics.leg(f) if j not in shared] or kinematics.leg(f)
+        hips.append(max(float(kinematics.data.xanchor[j + 1][2]) for j in own) - floor)
     reach = float(np.ptp(xpos, axis=0).max())
     return Stance(xpos, xrot, floor, max(float(np.mean(hips)), 0.02 * reach, 1e-3))
 
 
-def _leg_length(puppet: KinematicModel, foot: int) -> float:
+def _leg_length(kinematics: KinematicModel, foot: int) -> float:
     """Leg length in m along the joints down to the sole, in the latest pose."""
-    anchors = puppet.data.xanchor[[j + 1 for j in puppet.leg(foot)]]
-    sole = puppet.sole_points(puppet.data.xpos[1:], puppet.data.xmat[1:].reshape(-1, 3, 3))[foot]
+    anchors = kinematics.data.xanchor[[j + 1 for j in kinematics.leg(foot)]]
+    sole = kinematics.sole_points(
+        kinematics.data.xpos[1:], kinematics.data.xmat[1:].reshape(-1, 3, 3)
+    )[foot]
     path = np.concatenate([anchors, sole.mean(0)[None]])
     return max(float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), 1e-3)
 
@@ -101,30 +107,34 @@ class Search:
 
     def __init__(
         self,
-        puppet: KinematicModel,
+        kinematics: KinematicModel,
         start: np.ndarray,
         mirror: tuple[np.ndarray, np.ndarray] | None,
         planar: bool,
     ) -> None:
-        self.puppet, self.mirror, self.planar = puppet, mirror, planar
-        self.start = symmetric(np.clip(start, puppet.low, puppet.high), mirror)
-        stance = stance_of(puppet, self.start)
-        self.hip = 0.85 * float(np.mean([_leg_length(puppet, f) for f in range(len(puppet.feet))]))
+        self.kinematics, self.mirror, self.planar = kinematics, mirror, planar
+        self.start = symmetric(np.clip(start, kinematics.low, kinematics.high), mirror)
+        stance = stance_of(kinematics, self.start)
+        self.hip = 0.85 * float(
+            np.mean([_leg_length(kinematics, f) for f in range(len(kinematics.feet))])
+        )
         self.segments = [
-            s for s in puppet.segments() if not any(set(s) & set(group) for group in puppet.feet)
+            s
+            for s in kinematics.segments()
+            if not any(set(s) & set(group) for group in kinematics.feet)
         ]
         lying = self._lying(stance, straight=False)
-        if not lying and len(puppet.feet) == 1:
+        if not lying and len(kinematics.feet) == 1:
             # A body on one foot needs its whole sole, even if the shank reaches the floor.
-            lying = self._lying(stance_of(puppet, self._straightest()), straight=True)
-            above = {int(puppet.parent[puppet.feet[f][0]]) for f in lying} - {0}
+            lying = self._lying(stance_of(kinematics, self._straightest()), straight=True)
+            above = {int(kinematics.parent[kinematics.feet[f][0]]) for f in lying} - {0}
             self.segments = [s for s in self.segments if not set(s) & above]
         self.flat, self.ups = list(lying), list(lying.values())
-        self.legs = [puppet.leg(f) for f in range(len(puppet.feet))]
+        self.legs = [kinematics.leg(f) for f in range(len(kinematics.feet))]
 
     def _straightest(self) -> np.ndarray:
         """Pose [J] with all joints as near to 0 as their limits allow."""
-        nearest = np.clip(np.zeros_like(self.start), self.puppet.low, self.puppet.high)
+        nearest = np.clip(np.zeros_like(self.start), self.kinematics.low, self.kinematics.high)
         return symmetric(nearest, self.mirror)
 
     def _lying(self, stance: Stance, straight: bool) -> dict[int, np.ndarray]:
@@ -134,11 +144,13 @@ class Search:
         """
         up = np.array([0.0, 0.0, 1.0])
         found = {}
-        for f, sole in enumerate(self.puppet.sole_points(stance.xpos, stance.xrot)):
+        for f, sole in enumerate(self.kinematics.sole_points(stance.xpos, stance.xrot)):
             low = sole[sole[:, 2] < sole[:, 2].min() + 0.03 * self.hip]
             broad = len(low) > 1 and np.ptp(low[:, :2], axis=0).max() > 0.12 * self.hip
-            if broad and all(tip.far.all() for tip in self.puppet.tips[f]):
-                found[f] = stance.xrot[self.puppet.feet[f][0]].T @ (across(low) if straight else up)
+            if broad and all(tip.far.all() for tip in self.kinematics.tips[f]):
+                found[f] = stance.xrot[self.kinematics.feet[f][0]].T @ (
+                    across(low) if straight else up
+                )
         return found
 
     def run(self, spread: float, seed: int) -> tuple[np.ndarray, float]:
@@ -152,7 +164,8 @@ class Search:
                 rng.normal(size=shape) if i else rng.uniform(-1, 1, (FIRST, len(mean)))
             )
             poses = [
-                symmetric(np.clip(q, self.puppet.low, self.puppet.high), self.mirror) for q in drawn
+                symmetric(np.clip(q, self.kinematics.low, self.kinematics.high), self.mirror)
+                for q in drawn
             ]
             costs = np.array([self.cost(q) for q in poses])
             order = costs.argsort()[:ELITE]
@@ -164,11 +177,11 @@ class Search:
 
     def stretch(self, q: np.ndarray) -> float:
         """Mean straightness of the legs in a pose [J]."""
-        soles = self.puppet.sole_points(*self.puppet.pose(q))
+        soles = self.kinematics.sole_points(*self.kinematics.pose(q))
         ratios = []
         for sole, leg in zip(soles, self.legs, strict=True):
             path = np.concatenate(
-                [self.puppet.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]]
+                [self.kinematics.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]]
             )
             ratios.append(straightness(path))
         return float(np.mean(ratios))
@@ -179,21 +192,21 @@ class Search:
         Terms: uneven feet, weight beside them, other parts low, stretched legs, feet within the
         hips, closeness to limits, distance from the file's pose.
         """
-        puppet, hip = self.puppet, self.hip
-        xpos, xrot = puppet.pose(q)
-        soles = puppet.sole_points(xpos, xrot)
+        kinematics, hip = self.kinematics, self.hip
+        xpos, xrot = kinematics.pose(q)
+        soles = kinematics.sole_points(xpos, xrot)
         lows = np.array([sole[:, 2].min() for sole in soles])
         floor = float(lows.min())
         middles = np.array(
             [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * hip].mean(0) for sole in soles]
         )
-        beside = (puppet.centre_of_mass() - middles.mean(0))[:2] / hip
-        others = [puppet.lowest(xpos, xrot, s) - floor for s in self.segments]
-        others.append(puppet.shank_height(xpos, xrot) - floor)
+        beside = (kinematics.centre_of_mass() - middles.mean(0))[:2] / hip
+        others = [kinematics.lowest(xpos, xrot, s) - floor for s in self.segments]
+        others.append(kinematics.shank_height(xpos, xrot) - floor)
         crouched = sum(max(0.2 - h / hip, 0.0) for h in others)
         stretched = beneath = narrow = ahead = 0.0
         for f, leg in enumerate(self.legs):
-            anchors = puppet.data.xanchor[[j + 1 for j in leg]]
+            anchors = kinematics.data.xanchor[[j + 1 for j in leg]]
             path = np.concatenate([anchors, middles[f][None]])
             beneath += max(float(np.linalg.norm(path[-1][:2] - path[0][:2])) / hip - 0.3, 0.0)
             ahead += (float(path[-1][0] - path[0][0]) / hip) ** 2
@@ -201,9 +214,11 @@ class Search:
             narrow += max(abs(side) - float(middles[f][1]) * np.sign(side), 0.0) / hip
             ratio = straightness(path)
             stretched += max(ratio - 0.94, 0.0) + max(0.75 - ratio, 0.0)
-        near = np.maximum(MARGIN - np.minimum(q - puppet.low, puppet.high - q), 0.0) / MARGIN
+        near = (
+            np.maximum(MARGIN - np.minimum(q - kinematics.low, kinematics.high - q), 0.0) / MARGIN
+        )
         tilted = sum(
-            1 - float((xrot[puppet.feet[f][0]] @ up)[2])
+            1 - float((xrot[kinematics.feet[f][0]] @ up)[2])
             for f, up in zip(self.flat, self.ups, strict=True)
         )
         low_trunk = max(0.6 - (xpos[0][2] - floor) / hip, 0.0)

@@ -34,7 +34,7 @@ AT_ITS_END = 0.05
 class Candidate:
     """A tried standing pose: bodies with foot geoms, the keyframe, and the stand test."""
 
-    puppet: KinematicModel
+    kinematics: KinematicModel
     q: np.ndarray
     feet: list[list[str]]
     drive: Drive
@@ -43,13 +43,13 @@ class Candidate:
     notes: Notes
 
 
-def first_pose(puppet: KinematicModel, model: mujoco.MjModel, anatomy: Anatomy) -> np.ndarray:
+def first_pose(kinematics: KinematicModel, model: mujoco.MjModel, anatomy: Anatomy) -> np.ndarray:
     """Pose [J] in which the anatomy was found."""
-    return _angles(puppet, model, anatomy.qpos)
+    return _angles(kinematics, model, anatomy.qpos)
 
 
 def offered_poses(
-    puppet: KinematicModel,
+    kinematics: KinematicModel,
     model: mujoco.MjModel,
     anatomy: Anatomy,
     source: Source,
@@ -63,11 +63,11 @@ def offered_poses(
         ),
     )
     poses = [
-        (f'the keyframe "{model.key(k).name}"', _angles(puppet, model, model.key_qpos[k]))
+        (f'the keyframe "{model.key(k).name}"', _angles(kinematics, model, model.key_qpos[k]))
         for k in order[:3]
     ]
     poses += [
-        ("init_qpos", _angles(puppet, model, np.array(p)))
+        ("init_qpos", _angles(kinematics, model, np.array(p)))
         for p in source.poses
         if len(p) == model.nq
     ]
@@ -75,14 +75,14 @@ def offered_poses(
     return [(what, q) for what, q in poses if np.isfinite(q).all()]
 
 
-def _angles(puppet: KinematicModel, model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
-    hinges = model.jnt_type[puppet.source] == HINGE
-    q = np.where(hinges, qpos[model.jnt_qposadr[puppet.source]], 0.0)
-    return np.clip(q, puppet.low, puppet.high)
+def _angles(kinematics: KinematicModel, model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
+    hinges = model.jnt_type[kinematics.source] == HINGE
+    q = np.where(hinges, qpos[model.jnt_qposadr[kinematics.source]], 0.0)
+    return np.clip(q, kinematics.low, kinematics.high)
 
 
 def standing(
-    puppet: KinematicModel,
+    kinematics: KinematicModel,
     offered: list[tuple[str, np.ndarray]],
     mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
@@ -90,9 +90,9 @@ def standing(
 ) -> Candidate:
     """Return the first pose that stands, of the file's and the search's; else the best one."""
     tried: list[tuple[str, Candidate]] = []
-    search = Search(puppet, offered[0][1], mirror, planar)
+    search = Search(kinematics, offered[0][1], mirror, planar)
     for what, q in offered:
-        tried.append((what, _try(puppet, q, mirror, planar, notes)))
+        tried.append((what, _try(kinematics, q, mirror, planar, notes)))
         # Legs that are straight out have no length left to step with: such a pose is only the
         # second choice.
         if tried[-1][1].held.stands and search.stretch(q) < STRAIGHT:
@@ -102,7 +102,7 @@ def standing(
             tried.append(
                 (
                     "a search over leg bends",
-                    _try(puppet, search.run(spread, seed)[0], mirror, planar, notes),
+                    _try(kinematics, search.run(spread, seed)[0], mirror, planar, notes),
                 )
             )
             if tried[-1][1].held.stands and search.stretch(tried[-1][1].q) < STRAIGHT:
@@ -131,14 +131,14 @@ def standing(
 
 
 def _try(
-    puppet: KinematicModel,
+    kinematics: KinematicModel,
     q: np.ndarray,
     mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
     notes: Notes,
 ) -> Candidate:
     """Add foot geoms in a pose, and run the stand test."""
-    notes, trial = copy.deepcopy(notes), puppet.copy()
+    notes, trial = copy.deepcopy(notes), kinematics.copy()
     level(trial, q)
     drop(trial, q)
     _keep_stops(trial, q)
@@ -156,11 +156,13 @@ def _try(
     return Candidate(made, q, feet, drive, qpos, held, notes)
 
 
-def _keep_stops(puppet: KinematicModel, q: np.ndarray) -> None:
+def _keep_stops(kinematics: KinematicModel, q: np.ndarray) -> None:
     """Keep the stops of joints that stand at an end of their range.
 
     Such a stop bears weight, like a straight knee's. Other limits are left to the controller,
     because each costs a row of the solver.
     """
-    for joint, low, high in zip(puppet.joints, q - puppet.low, puppet.high - q, strict=True):
+    for joint, low, high in zip(
+        kinematics.joints, q - kinematics.low, kinematics.high - q, strict=True
+    ):
         joint.limited = int(min(low, high) < AT_ITS_END)

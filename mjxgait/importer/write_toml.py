@@ -177,8 +177,8 @@ def creature_toml(
         it. planar: whether its legs are in one plane and pass each other. bones: of a skeleton, by
         part. train: settings that differ from the defaults.
     """
-    joints, drive, notes = best.puppet.names, best.drive, best.notes
-    root = best.puppet.bodies[0]
+    joints, drive, notes = best.kinematics.names, best.drive, best.notes
+    root = best.kinematics.bodies[0]
     forward = rotation(root.quat).T @ [1.0, 0.0, 0.0]
     feet = [_quoted(geom) for foot in best.feet for geom in foot]
     remark = {
