@@ -12,6 +12,7 @@ Give it a body and it returns a walk that holds up in physics, tested in a secon
     mjxgait.walk(run)                     # columns for pandas: joints, feet, trunk over time
     mjxgait.examine(run)                  # the certificate again, criterion by criterion
     mjxgait.open("runs/x").metrics()      # fitness over generations
+    mjxgait.frames(["runs/x", "runs/y"])  # the same of several runs, for pandas
     mjxgait.load_creature("my_dog.xml")   # a body: shipped, a folder, MJCF or URDF
 
 On the command line: `mjxgait --help`.
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from mjxgait.api import (
         Run,
         examine,
+        frames,
         load_creature,
         open,
         refine,
@@ -31,7 +33,16 @@ if TYPE_CHECKING:
     )
 
 __version__ = "0.1.0"
-__all__ = ["Run", "examine", "load_creature", "open", "refine", "train", "walk"]
+__all__ = [
+    "Run",
+    "examine",
+    "frames",
+    "load_creature",
+    "open",
+    "refine",
+    "train",
+    "walk",
+]
 
 
 def __getattr__(name: str) -> object:

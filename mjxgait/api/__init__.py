@@ -16,12 +16,13 @@ from mjxgait.api.make import (
     verify,
     walk,
 )
-from mjxgait.api.run import Run, open
+from mjxgait.api.run import Run, frames, open
 
 __all__ = [
     "Run",
     "examine",
     "examine_expressions",
+    "frames",
     "load_creature",
     "open",
     "refine",

@@ -1,26 +1,32 @@
 """A run folder as an object."""
 
 import dataclasses
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mjxgait.certification import outdated, read_certificate, verdict_of
 from mjxgait.certification.verdict import Document
 from mjxgait.champion import Champion
+from mjxgait.config.layers import install_command
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
+from mjxgait.errors import UserError
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
     METRICS,
+    MOTHERS,
     open_champion,
     open_run,
     read_metrics,
 )
 
-if TYPE_CHECKING:  # it imports all drawing code
+if TYPE_CHECKING:  # all drawing code; an extra
+    import pandas
+
     from mjxgait.animation.keys.refine import Departure
 
 Place = str | Path
@@ -92,6 +98,42 @@ class Run:
             name: np.array([np.nan if line.get(name) is None else line[name] for line in lines])
             for name in names
         }
+
+    def frame(self) -> "pandas.DataFrame":
+        """Return `metrics.jsonl` as a table, a row per generation; without `mothers`.
+
+        Raises:
+          UserError: pandas is not installed, or the log is damaged.
+        """
+        lines = read_metrics(self.folder / METRICS)
+        rows = [{name: value for name, value in line.items() if name != MOTHERS} for line in lines]
+        columns = None if rows else ["generation"]
+        return _pandas().DataFrame(rows, columns=columns).set_index("generation")
+
+
+def frames(runs: Iterable[Run | Place]) -> "pandas.DataFrame":
+    """Return the metrics of several runs as one table; see `Run.frame`.
+
+    The index has the levels `run`, the folder, and `generation`; a column `seed` comes first.
+
+    Raises:
+      UserError: see `Run.frame`; a folder is no run, or there is none.
+    """
+    known = [one if isinstance(one, Run) else open(one) for one in runs]
+    if not known:
+        raise UserError("frames: there is no run; name at least one run folder")
+    tables = {str(one.folder): one.frame() for one in known}
+    for one in known:
+        tables[str(one.folder)].insert(0, "seed", one.config.seed)
+    return _pandas().concat(tables, names=["run"])
+
+
+def _pandas() -> Any:
+    try:
+        import pandas
+    except ImportError:
+        raise UserError(f"tables need pandas: {install_command('pandas')}") from None
+    return pandas
 
 
 def open(folder: Place) -> Run:

@@ -42,7 +42,7 @@ def test_named_extras_exist():
         for text in file.read_text(encoding="utf-8").splitlines()
         if "install_command('" in text
     }
-    assert used == {"video", "usd", "cluster", "peers"}
+    assert used == {"video", "usd", "cluster", "peers", "pandas"}
     assert used <= known.keys()
 
 
