@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -41,6 +41,8 @@ from mjxgait.training.stored import disk_errors
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.training.screen import Screen
+
+Tracker = Literal["tensorboard", "wandb"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,6 +93,8 @@ class TrainOptions:
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
       physics: Short for --rollout.physics: mjx simulates with MJX itself, auto with this program's
         faster step where it supports the model (docs/research/performance.md).
+      log: Log for a tracker, repeatable: tensorboard writes event files into the run folder, wandb an
+        offline run (docs/guide/research-tools.md).
       view: Show the best of each generation walking on a page that only this machine can reach.
       plots: Draw all plots at the end of the run (`mjxgait plot`).
       settings: The config, key by key.
@@ -118,6 +122,7 @@ class TrainOptions:
     cluster: str | None = None
     ground: str | None = None
     physics: Physics | None = None
+    log: Annotated[tuple[Tracker, ...], tyro.conf.UseAppendAction] = ()
     view: bool = False
     plots: bool = True
     settings: Annotated[Config, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Config)
@@ -177,12 +182,13 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
     """Evolve a new or resumed run and draw it; return the exit code."""
     # JAX takes a second to import, so the options are checked first.
     from mjxgait.cli.view import following
-    from mjxgait.training.screen import Screen
     from mjxgait.training.stages import prepare_devices
+    from mjxgait.training.trackers import tracked
 
     prepare_devices(1 if options.cluster else None)
-    screen, resumed = Screen(), options.resume is not None
+    resumed = options.resume is not None
     with contextlib.ExitStack() as beside:
+        screen = beside.enter_context(tracked(folder, options.log))
 
         def begin() -> None:
             if not resumed:
@@ -200,8 +206,8 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
 
 def _several(options: TrainOptions, creature: Creature, config: Config, default: Config) -> int:
     """Evolve several runs side by side; return the exit code."""
-    if options.view or options.generation is not None:
-        raise UserError("--runs: several runs have no --view and no --generation")
+    if options.view or options.log or options.generation is not None:
+        raise UserError("--runs: several runs have no --view, no --log and no --generation")
     if options.resume is None:
         assert options.runs is not None
         # On a cluster each run is a job of its own, so that every machine gets work.
