@@ -13,6 +13,7 @@ Give it a body and it returns a walk that holds up in physics, tested in a secon
     mjxgait.examine(run)                  # the certificate again, criterion by criterion
     mjxgait.open("runs/x").metrics()      # fitness over generations
     mjxgait.frames(["runs/x", "runs/y"])  # the same of several runs, for pandas
+    mjxgait.environment("duck")           # reset and step in JAX, for algorithms of your own
     mjxgait.load_creature("my_dog.xml")   # a body: shipped, a folder, MJCF or URDF
 
 On the command line: `mjxgait --help`.
@@ -23,6 +24,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mjxgait.api import (
         Run,
+        environment,
         examine,
         frames,
         load_creature,
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = [
     "Run",
+    "environment",
     "examine",
     "frames",
     "load_creature",

@@ -21,6 +21,7 @@ FLOORS = (
     ("animation",),
     ("rendering",),
     ("inspect", "controllers/*/report"),
+    ("environments",),
     ("training",),
     ("plugins", "controllers/expressions/written", "tasks/walk/targets"),
     ("certification", "tasks/*/*criteria"),

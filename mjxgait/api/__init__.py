@@ -7,6 +7,7 @@ run.champion, run.certificate, run.metrics()
 mjxgait.walk(run)["trunk_z"]
 """
 
+from mjxgait.api.environments import environment
 from mjxgait.api.make import (
     examine,
     examine_expressions,
@@ -20,6 +21,7 @@ from mjxgait.api.run import Run, frames, open
 
 __all__ = [
     "Run",
+    "environment",
     "examine",
     "examine_expressions",
     "frames",

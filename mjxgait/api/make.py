@@ -109,7 +109,7 @@ def train(
     from mjxgait.controllers.expressions.written import with_expressions
     from mjxgait.tasks.walk.targets import WalkTargets, configured
 
-    use = _use(controller=controller, task=task)
+    use = used(controller=controller, task=task)
     creature = load_creature(env, scale, way=way)
     requested = {
         "speed": speed,
@@ -250,7 +250,7 @@ def evolve(
     )
 
 
-def _use(**named: str | None) -> dict[str, str]:
+def used(**named: str | None) -> dict[str, str]:
     """Return the names of the given controller and task; load user-defined code."""
     given = {kind: text for kind, text in named.items() if text is not None}
     if not given:

@@ -195,7 +195,7 @@ class Simulator:
             lane = self._look_for_overlap(lane)
             done = (lane.stats.steps >= self.steps) | (lane.stats.reason != FINISHED)
             results = store(results, jnp.where(done, lane.job, queue), lane.stats)
-            lane = self._per_lane(_choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
+            lane = self._per_lane(choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
             return lane, results, taken + jnp.sum(done), rounds + 1
 
         results = jax.tree.map(
@@ -278,7 +278,7 @@ class Simulator:
         torque = self.drive.torque(self.plant, lane.rules, body, sensed, step_data, command)
         late = lane.late
         if late is not None:
-            torque, late = self._per_lane(_arriving)(late, lane.stats.steps, torque)
+            torque, late = self._per_lane(arriving)(late, lane.stats.steps, torque)
         stats = self._per_lane(self._evaluate)(lane, sensed, torque)
         body = self.plant.advance(body, step_data, self._per_lane(self.drive.lift)(torque))
         goal = self._per_lane(self.task.next_goal)(lane.goal, sensed)
@@ -316,7 +316,7 @@ class Simulator:
     def reason(self, sensed: Sensed, goal: object) -> jax.Array:
         """Return why [] an episode ends now; `FINISHED` while it goes on."""
         ended = self.task.ended(sensed, goal)
-        return jnp.where(_finite(sensed), ended, NONFINITE).astype(jnp.int32)
+        return jnp.where(finite(sensed), ended, NONFINITE).astype(jnp.int32)
 
     def _evaluate(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
         """Update the statistics after a step, unless the episode has ended."""
@@ -325,28 +325,33 @@ class Simulator:
         reason = self.reason(sensed, lane.goal)
         updated = self.task.update(stats, sensed, torque, lane.params, lane.goal)
         kept = dataclasses.replace(stats, reason=jnp.where(going, reason, stats.reason))
-        return _choose(going & (reason == FINISHED), updated, kept)
+        return choose(going & (reason == FINISHED), updated, kept)
 
     def _per_lane(self, function: Function) -> Function:
         return per_lane(self.plant, function)
 
 
-def _finite(sensed: Sensed) -> jax.Array:
+def finite(sensed: Sensed) -> jax.Array:
     """Tell whether [] all that a step depends on is finite."""
     seen = (sensed.joint_vel, sensed.trunk_pos, sensed.trunk_rot, sensed.bias)
     return jnp.isfinite(sum(jnp.sum(part) for part in seen))
 
 
-def _choose(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
+def choose(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
+    """Return one of two pytrees by a condition []."""
     return jax.tree.map(partial(jnp.where, condition), yes, no)
 
 
 def _push(lane: Lane) -> BodyState:
-    now = lane.stats.steps == lane.push_step
-    return dataclasses.replace(lane.body, qvel=lane.body.qvel + jnp.where(now, lane.push, 0.0))
+    return pushed(lane.body, lane.push, lane.stats.steps == lane.push_step)
 
 
-def _arriving(late: Late, step: jax.Array, torque: jax.Array) -> tuple[jax.Array, Late]:
+def pushed(body: BodyState, push: jax.Array, now: jax.Array) -> BodyState:
+    """Return the state with a push [nv] added to its velocity, if it is due now []."""
+    return dataclasses.replace(body, qvel=body.qvel + jnp.where(now, push, 0.0))
+
+
+def arriving(late: Late, step: jax.Array, torque: jax.Array) -> tuple[jax.Array, Late]:
     """Return the torques [J] that arrive at a step [], and those still delayed.
 
     The latter include this step's own. Before the first torque arrives it already acts, as if the

@@ -6,8 +6,10 @@ Python number if it is a constant: the many zeros and ones of a model then cost 
 scalars make a `Vector`; `turn` and `plus` also serve vectors that are one array [3, L].
 """
 
+import contextlib
+import contextvars
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol, TypeVar
 
 import jax
@@ -18,6 +20,23 @@ from jax.experimental.xla_metadata import set_xla_metadata
 from mjxgait.types import Number, Tree
 
 Result = TypeVar("Result")
+
+
+_APART = contextvars.ContextVar("apart", default=False)
+"""Whether functions are traced now without the mark of `one_kernel`."""
+
+
+@contextlib.contextmanager
+def separate_kernels() -> Iterator[None]:
+    """Leave `one_kernel` without effect on what is traced in this context.
+
+    XLA's CPU compiler aborts on marked calls that JAX traces into a `custom_vmap`.
+    """
+    token = _APART.set(True)
+    try:
+        yield
+    finally:
+        _APART.reset(token)
 
 
 def one_kernel(function: Callable[..., Result]) -> Callable[..., Result]:
@@ -40,7 +59,7 @@ def one_kernel(function: Callable[..., Result]) -> Callable[..., Result]:
 
     @functools.wraps(function)
     def marked(*args: object) -> Result:
-        if jax.default_backend() != "cpu":
+        if jax.default_backend() != "cpu" or _APART.get():
             return function(*args)
         with set_xla_metadata(xla_cpu_small_call="true", inlineable="false"):
             return compiled(*args)
