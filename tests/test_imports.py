@@ -13,6 +13,7 @@ FLOORS = (
     ("__init__",),
     ("__main__",),
     ("cli",),
+    ("gym_envs",),
     ("api",),
     ("experiments",),
     ("distributed",),

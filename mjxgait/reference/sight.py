@@ -46,21 +46,37 @@ def overlaps(creature: Creature, qpos: np.ndarray, excused: bool = True) -> Over
 
     excused: whether the overlap of the standing pose, part of the model as drawn, is subtracted.
     """
-    model = colliding_with_itself(creature)
-    data = mujoco.MjData(model)
-    usual = _depths(model, data, creature.stand_qpos) if excused else {}
+    pairs = PartOverlap(creature, excused)
     found: dict[tuple[int, int], np.ndarray] = {}
     finite = np.isfinite(qpos).all(1)
     for k in np.flatnonzero(finite):
-        for geoms, depth in _depths(model, data, qpos[k]).items():
-            more = depth - usual.get(geoms, 0.0)
-            if more > 0:
-                one, other = sorted(int(model.geom_bodyid[g]) for g in geoms)
-                of_pair = found.setdefault((one, other), np.zeros(len(qpos)))
-                of_pair[k] = max(of_pair[k], more)
+        for geoms, more in pairs.depths(qpos[k]).items():
+            one, other = sorted(int(pairs.model.geom_bodyid[g]) for g in geoms)
+            of_pair = found.setdefault((one, other), np.zeros(len(qpos)))
+            of_pair[k] = max(of_pair[k], more)
+    model = pairs.model
     names = tuple((model.body(a).name, model.body(b).name) for a, b in found)
     depths = np.array(list(found.values())).reshape(len(found), len(qpos)).T
     return Overlaps(names, np.where(finite[:, None], depths, np.nan))
+
+
+class PartOverlap:
+    """Overlap of a creature's parts, pose by pose; see `overlaps`."""
+
+    def __init__(self, creature: Creature, excused: bool = True) -> None:
+        self.model = colliding_with_itself(creature)
+        self._data = mujoco.MjData(self.model)
+        self._usual = _depths(self.model, self._data, creature.stand_qpos) if excused else {}
+
+    def depths(self, qpos: np.ndarray) -> dict[tuple[int, int], float]:
+        """Return the depth in m of each pair of geoms that overlap in a pose [nq] more than usual."""
+        found = _depths(self.model, self._data, qpos)
+        more = {geoms: depth - self._usual.get(geoms, 0.0) for geoms, depth in found.items()}
+        return {geoms: depth for geoms, depth in more.items() if depth > 0}
+
+    def deepest(self, qpos: np.ndarray) -> float:
+        """Return the largest depth in m in a pose [nq]; 0 if no parts overlap."""
+        return max(self.depths(qpos).values(), default=0.0)
 
 
 def colliding_with_itself(creature: Creature) -> mujoco.MjModel:

@@ -120,6 +120,25 @@ def test_an_episode_ends_with_the_tasks_own_end_or_its_time(played_and_evaluated
     assert (states.done.sum(axis=1)[failed] > 1).all()
 
 
+def test_gymnasium_in_c_mujoco_agrees(environment: Environment, played_and_evaluated: tuple):
+    """The same actions on the same trials, through a push and to the end of what goes too high."""
+    pytest.importorskip("gymnasium")
+    from mjxgait.environments.gym import CreatureEnv, compiled
+
+    states, _, starts = played_and_evaluated
+    other = CreatureEnv(compiled(environment.problem))
+    for trial, row in ((0, 2), (1, COUNT + 2)):
+        other.begin(jax.tree.map(lambda leaf, trial=trial: leaf[trial], starts))
+        steps = [other.step(action) for action in states.info["action"][row]]
+        seen = np.array([observation for observation, *_ in steps])
+        fitness = np.cumsum([reward for _, reward, *_ in steps])
+        done = [terminated or truncated for _, _, terminated, truncated, _ in steps]
+        assert np.array_equal(done, states.done[row])
+        until = done.index(True) + 1
+        assert np.allclose(seen[:until], states.obs[row, :until], atol=0.02)
+        assert np.allclose(fitness, states.metrics["fitness"][row], atol=0.002)
+
+
 def test_episodes_of_vmap_are_lanes():
     """The physics sees all episodes as lanes, whatever loop or axis is around them."""
     seen = []
