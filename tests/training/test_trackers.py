@@ -108,7 +108,7 @@ def test_train_passes_its_generations_on(tmp_path: Path, monkeypatch, capsys):
     pytest.importorskip("tensorboardX")
 
     def evolve(folder: Path, creature: object, config: object, screen, *rest: object) -> bool:
-        rest[-1]()
+        rest[3]()
         whole = line(0, 1.0) | {"episodes": 1, "failures": 0, "wall_s": 0.1}
         append_lines(folder / "metrics.jsonl", [whole])
         screen.generation(whole, config)
