@@ -182,9 +182,10 @@ class Walk:
 
         A body that grew has no front: the direction of its whole way counts.
         """
-        way = (self.trunk_pos[-1] - self.trunk_pos[0])[:2]
-        if self.grown and np.linalg.norm(way) > LEAST_WAY:
-            return way / np.linalg.norm(way)
+        if self.grown:
+            way = (self.trunk_pos[-1] - self.trunk_pos[0])[:2]
+            if np.linalg.norm(way) > LEAST_WAY:
+                return way / np.linalg.norm(way)
         axis = (self.creature.frame.stand_rot @ self.creature.frame.forward)[:2]
         return axis / np.linalg.norm(axis)
 

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from helpers import said_by
 
-from mjxgait.animation.export.motion import BASE, motion
-from mjxgait.processes import python_command
+from mjxgait.animation.export.motion import BASE, export_motion, motion
 from mjxgait.rendering.walk import Walk, record_walk
 from mjxgait.training.folder import open_champion
 
@@ -28,13 +27,17 @@ def walk() -> Walk:
 
 
 @pytest.fixture(scope="module")
-def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Both files, written by the command."""
+def exported(walk: Walk, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("motion")
     for kind in ("csv", "json"):
-        command = ["export", str(RUN), "--out", str(folder / f"motion.{kind}")]
-        subprocess.run(python_command("mjxgait", *command), check=True, capture_output=True)
+        export_motion(walk, folder / f"motion.{kind}")
     return folder
+
+
+def test_the_command_writes_the_whole_walk(tmp_path: Path, capsys):
+    said = said_by(capsys, "export", RUN, "--out", tmp_path / "motion.csv", code=0)
+    assert "12.00 s at 200 Hz" in said
+    assert len((tmp_path / "motion.csv").read_text().splitlines()) == 2401
 
 
 def test_columns_are_those_of_the_recording(walk: Walk):

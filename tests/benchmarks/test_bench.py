@@ -320,6 +320,7 @@ SIMULATED = pytest.mark.thorough("compiles the whole; each part has tests of its
 
 
 @pytest.mark.slow
+@pytest.mark.thorough("evolves, and starts the rivals; each part has tests of its own")
 @pytest.mark.parametrize(
     "simulated", [False, pytest.param(True, marks=SIMULATED)], ids=["made up", "simulated"]
 )
