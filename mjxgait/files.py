@@ -114,6 +114,19 @@ def check_tree(value: object) -> None:
     raise ValueError(f"nested deeper than {MOST_DEPTH}")
 
 
+@contextlib.contextmanager
+def writing(place: Path) -> Iterator[None]:
+    """Raise a UserError for an error of the system in the block, which writes a file or a folder.
+
+    Raises:
+      UserError: names the place and the reason.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{place}: cannot be written ({error.strerror or error})") from None
+
+
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file atomically: it holds either the old content or the new."""
     with replaced(path) as beside:

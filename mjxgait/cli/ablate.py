@@ -20,7 +20,7 @@ from mjxgait.config.tables import (
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import at_step
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.files import write_text
+from mjxgait.files import write_text, writing
 from mjxgait.training.folder import CREATURE, is_taken
 from mjxgait.training.stored import locked
 
@@ -209,13 +209,11 @@ def _check_new(folder: Path) -> None:
 
 def _create(folder: Path, study: "Study", creature: Creature) -> None:
     """Make the folder of a study, with its exact settings and creature."""
-    try:
+    with writing(folder):
         (folder / CREATURE).mkdir(parents=True, exist_ok=True)
         for name, text in creature.files.items():
             write_text(folder / CREATURE / name, text)
         write_text(folder / STUDY, dump_toml(study))
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
 
 
 def _open(folder: Path) -> tuple["Study", Creature]:

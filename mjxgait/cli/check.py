@@ -10,7 +10,7 @@ from mjxgait.certification.check_body import check_body
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.files import replaced
+from mjxgait.files import replaced, writing
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 from mjxgait.training.stored import require_writable
 
@@ -50,11 +50,8 @@ def check_command(arguments: Sequence[str]) -> int:
     print("\n".join(facts(creature, held)))
     if note := fallback_note(creature.evolution_model):
         print(note)
-    try:
-        with replaced(out) as beside:
-            portrait(creature).save(beside)
-    except OSError as error:
-        raise UserError(f"{out}: cannot be written ({error.strerror})") from None
+    with writing(out), replaced(out) as beside:
+        portrait(creature).save(beside)
     print(f"wrote {out}")
     if held.stands:
         return 0

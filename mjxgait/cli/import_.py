@@ -10,7 +10,7 @@ import tyro
 
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.files import write_text
+from mjxgait.files import write_text, writing
 from mjxgait.importer import (
     TOML,
     WRITTEN,
@@ -123,9 +123,7 @@ def write_folder(folder: Path, imported: Imported) -> None:
       UserError: the texts are not a creature, or the folder cannot be written.
     """
     load_files(imported.files)
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in imported.files.items():
             write_text(folder / name, text)
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be written ({error.strerror})") from None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from mjxgait.errors import UserError
-from mjxgait.files import replaced
+from mjxgait.files import replaced, writing
 
 if TYPE_CHECKING:
     from mjxgait.rendering.stage import Stage
@@ -159,8 +159,5 @@ def _still(runners: Sequence["Runner"], stage: "Stage", options: RenderOptions) 
     else:
         picture = stage.picture(stage.frames - 1)
         video.write_captions(picture, stage, runners, stage.frames - 1)
-    try:
-        with replaced(options.out) as beside:
-            picture.save(beside)
-    except OSError as error:
-        raise UserError(f"{options.out}: cannot be written ({error.strerror or error})") from None
+    with writing(options.out), replaced(options.out) as beside:
+        picture.save(beside)

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 
 from mjxgait.config.layers import install_command
 from mjxgait.errors import UserError
-from mjxgait.files import replaced
+from mjxgait.files import replaced, writing
 from mjxgait.rendering.floor import DARK_INK, font
 from mjxgait.rendering.gl import gl_pictures
 from mjxgait.rendering.stage import Stage
@@ -112,11 +112,8 @@ def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
         raise UserError(
             f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}'
         )
-    try:
-        with replaced(path) as beside:
-            write(pictures, beside, fps)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+    with writing(path), replaced(path) as beside:
+        write(pictures, beside, fps)
 
 
 def require_writer(path: Path) -> None:

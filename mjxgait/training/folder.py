@@ -30,7 +30,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.proportions import extreme_bodies
 from mjxgait.errors import NotLoaded, UserError
 from mjxgait.evolution.state import NOBODY
-from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, write_text
+from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, write_text, writing
 from mjxgait.plugins import build_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.user_code import KINDS, places_of
@@ -171,12 +171,10 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
       UserError: see `check_run`; or the folder cannot be written.
     """
     folder = check_run(folder, creature, config)
-    try:
+    with writing(folder):
         keep_body(folder / CREATURE, creature)
         keep_places(folder, config.use)
         write_text(folder / CONFIG, dump_toml(config))
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
     return folder
 
 

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from mjxgait.config.tables import Index, Text, check
 from mjxgait.errors import UserError
-from mjxgait.files import read_json
+from mjxgait.files import read_json, writing
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 CLOSED = (errno.EROFS, errno.EACCES, errno.EPERM)
@@ -67,12 +67,10 @@ def require_writable(path: Path) -> None:
     if not path.absolute().parent.is_dir():
         raise UserError(f"{path}: the folder {path.parent} does not exist")
     there = path.exists()
-    try:
+    with writing(path):
         path.open("ab").close()
         if not there:
             path.unlink()
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def refusal(error: BaseException) -> int | None:

@@ -22,7 +22,6 @@ from mjxgait.certification import (
 )
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.errors import UserError
 from mjxgait.rendering.curves import Figures, draw_fitness, figure
 from mjxgait.rendering.gaitplots import gait_figures
 from mjxgait.rendering.video import LOOP_SECONDS
@@ -60,10 +59,8 @@ def save_page(out: Path, page: str) -> None:
     Raises:
       UserError: the file cannot be written.
     """
-    try:
+    with files.writing(out):
         files.write_text(out, page)
-    except OSError as error:
-        raise UserError(f"{out}: cannot be written ({error.strerror})") from None
 
 
 def viewer_script() -> str:

@@ -20,8 +20,7 @@ from mjxgait.animation.export.skeleton import (
     world_poses,
 )
 from mjxgait.animation.export.surface import far_end
-from mjxgait.errors import UserError
-from mjxgait.files import write_text
+from mjxgait.files import write_text, writing
 
 ORDER = "ZXY"
 """Order of a bone's angles, as most programs write them."""
@@ -33,10 +32,8 @@ def export_bvh(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
     Raises:
       UserError: the file cannot be written.
     """
-    try:
+    with writing(path):
         write_text(path, build_bvh(loop, travelling))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

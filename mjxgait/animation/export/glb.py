@@ -29,8 +29,7 @@ from mjxgait.animation.export.skeleton import (
 )
 from mjxgait.animation.export.surface import Piece, along_limbs, linear, pieces_of
 from mjxgait.champion.serializers import serializer_of
-from mjxgait.errors import UserError
-from mjxgait.files import write_bytes
+from mjxgait.files import write_bytes, writing
 
 SAMPLES = 120
 """Samples of a cycle's motion, as many as the reader uses."""
@@ -73,10 +72,8 @@ def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
     Raises:
       UserError: the file cannot be written.
     """
-    try:
+    with writing(path):
         write_bytes(path, build_glb(loop, travelling, footfalls=True))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def build_glb(

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.errors import UserError
-from mjxgait.files import write_text
+from mjxgait.files import write_text, writing
 from mjxgait.rendering.walk import Walk
 
 BASE = ("x", "y", "z", "qw", "qx", "qy", "qz")
@@ -27,10 +26,8 @@ def export_motion(walk: Walk, path: Path) -> None:
     """
     columns = motion(walk)
     text = _csv(columns) if path.suffix.lower() == ".csv" else json.dumps(document(walk, columns))
-    try:
+    with writing(path):
         write_text(path, text)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def motion(walk: Walk) -> dict[str, np.ndarray]:

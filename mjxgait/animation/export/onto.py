@@ -32,7 +32,7 @@ from mjxgait.animation.export.skeleton import (
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import DOWN, geom_reach
 from mjxgait.errors import UserError
-from mjxgait.files import write_bytes
+from mjxgait.files import write_bytes, writing
 
 LOOP = "-loop"
 """End of the animation's name, by which Godot plays it in a loop."""
@@ -51,10 +51,8 @@ def export_onto(loop: WalkLoop, character: Character, path: Path, travelling: bo
       UserError: the file has not the creature's skeleton, or cannot be written.
     """
     name, data = build_onto(loop, character, travelling)
-    try:
+    with writing(path):
         write_bytes(path, data)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
     return name
 
 
