@@ -24,6 +24,12 @@ def pytree(cls: type[T]) -> type[T]:
     return jax.tree_util.register_dataclass(dataclasses.dataclass(frozen=True)(cls))
 
 
+def by_name(tree: object) -> dict[str, Any]:
+    """Return the leaves of a pytree by dotted name, as in checkpoints."""
+    leaves = jax.tree_util.tree_leaves_with_path(tree)
+    return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
+
+
 @pytree
 class BodyState:
     """State that the physics carries from one step to the next.

@@ -168,6 +168,7 @@ def _missing(wanted: Table, table: Table, added: frozenset[str], prefix: str = "
     return None
 
 
+@cache
 def added_in(cls: type, prefix: str = "") -> frozenset[str]:
     """Return the dotted keys of a schema that are marked `ADDED`."""
     found: set[str] = set()

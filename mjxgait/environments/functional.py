@@ -18,7 +18,7 @@ from mjxgait.environments.problem import NO_OVERLAP, Problem, Progress, Verdict
 from mjxgait.physics import make_plant
 from mjxgait.physics.lane_major.lanes import separate_kernels
 from mjxgait.plugins.registry import what_ends
-from mjxgait.simulation.rollout import Late, arriving, pushed
+from mjxgait.simulation.rollout import Late, arriving, first_body, pushed
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import BodyState, ModelPlant, Sensed, pytree
 
@@ -108,9 +108,9 @@ class Environment:
 
     def begin(self, trial: Starts) -> State:
         """Return the state at the start of a given trial []."""
-        data, told = on_lanes(self._begun, self.plant.lane_axis)(self._numbered(trial))
-        info = {"reason": told.reason, "time_out": told.time_out}
-        return State(data, told.obs, told.reward, told.done, told.metrics, info)
+        data, verdict = on_lanes(self._begun, self.plant.lane_axis)(self._numbered(trial))
+        info = {"reason": verdict.reason, "time_out": verdict.time_out}
+        return State(data, verdict.obs, verdict.reward, verdict.done, verdict.metrics, info)
 
     def step(self, state: State, action: jax.Array) -> State:
         """Return the state one control step later, under an action [J] in -1 to 1.
@@ -118,10 +118,10 @@ class Environment:
         An episode that has ended stays as it is, with reward 0, though its body moves on.
         """
         stepped = on_lanes(self._stepped, self.plant.lane_axis)
-        data, told = stepped(state.data, jnp.asarray(action, jnp.float32))
-        info = {**state.info, "reason": told.reason, "time_out": told.time_out}
-        metrics = {**state.metrics, **told.metrics}
-        return State(data, told.obs, told.reward, told.done, metrics, info)
+        data, verdict = stepped(state.data, jnp.asarray(action, jnp.float32))
+        info = {**state.info, "reason": verdict.reason, "time_out": verdict.time_out}
+        metrics = {**state.metrics, **verdict.metrics}
+        return State(data, verdict.obs, verdict.reward, verdict.done, metrics, info)
 
     @property
     def _drive(self) -> Drive:
@@ -137,17 +137,7 @@ class Environment:
     def _begun(self, trial: Starts) -> tuple[Data, Verdict]:
         """Begin the episodes of all lanes."""
         problem, lanes = self.problem, self._per_lane
-        still = jnp.zeros_like(trial.qvel)
-        body = BodyState(
-            trial.qpos,
-            trial.qvel,
-            warmstart=still,
-            constraint_force=still,
-            friction=trial.friction,
-            parameters=trial.numbers,
-            ground=trial.ground,
-        )
-        body = lanes(pushed)(body, trial.push, trial.push_step == 0)
+        body = lanes(pushed)(first_body(trial), trial.push, trial.push_step == 0)
         sensed, step_data = self.plant.forward(body)
         progress = lanes(problem.begin)(trial, sensed)
         late = None
@@ -175,11 +165,11 @@ class Environment:
         sensed, step_data = plant.forward(body)
         overlap = self._overlap(body, lanes(problem.looks)(before))
         progress = lanes(problem.after)(before, data.sensed, torque, sensed, overlap)
-        told = lanes(problem.verdict)(before, progress, sensed)
+        verdict = lanes(problem.verdict)(before, progress, sensed)
         after = dataclasses.replace(
             data, body=body, sensed=sensed, step_data=step_data, progress=progress, late=late
         )
-        return after, told
+        return after, verdict
 
     def _overlap(self, body: BodyState, due: jax.Array) -> jax.Array:
         """Return the overlap of parts in m in the lanes that are looked at.

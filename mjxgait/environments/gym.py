@@ -185,8 +185,7 @@ class CreatureEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
         The last info of an episode has its metrics, and `reason`, a `tasks.base.Reason`.
         """
-        low, high = self.problem.ranges
-        target = low + 0.5 * (np.clip(action, -1.0, 1.0) + 1.0) * (high - low)
+        target = self.problem.targets(np.asarray(action))
         simulation, before = self._simulation, self._sensed
         torque = np.float32(simulation.step(np.asarray(target, np.float64)))
         overlap = NO_OVERLAP
@@ -194,11 +193,11 @@ class CreatureEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             overlap = self._functions.part_overlap.deepest(simulation.bodies.qpos[0])
         self._sensed = simulation.sensed
         given = (self._progress, before, torque, self._sensed, np.float32(overlap))
-        self._progress, told = self._functions.after(*given)
-        reason = int(told.reason)
+        self._progress, verdict = self._functions.after(*given)
+        reason = int(verdict.reason)
         info: dict[str, Any] = {}
-        if told.done:
-            info = {name: float(value) for name, value in told.metrics.items()}
+        if verdict.done:
+            info = {name: float(value) for name, value in verdict.metrics.items()}
             info["reason"] = reason
-        over = reason != FINISHED, bool(told.time_out)
-        return np.asarray(told.obs), float(told.reward), *over, info
+        over = reason != FINISHED, bool(verdict.time_out)
+        return np.asarray(verdict.obs), float(verdict.reward), *over, info

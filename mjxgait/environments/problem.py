@@ -8,7 +8,7 @@ episode is the task's fitness.
 import dataclasses
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -22,8 +22,8 @@ from mjxgait.errors import UserError
 from mjxgait.plugins import make_task
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import what_ends
-from mjxgait.simulation.rollout import CHECK_EVERY, choose, finite
-from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, Task, in_order
+from mjxgait.simulation.rollout import CHECK_EVERY, choose, deepened, is_going, reason_of
+from mjxgait.tasks.base import FINISHED, EpisodeStats, Task, in_order
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed, pytree
 
@@ -48,6 +48,7 @@ AXES: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "trunk_rot": (("x", "y", "z"), ("0", "1", "2")),
 } | dict.fromkeys(("trunk_pos", "trunk_vel", "trunk_angvel"), (("x", "y", "z"),))
 """Names along the axes of observations that are no numbers; an empty tuple counts the feet."""
+Array = TypeVar("Array", jax.Array, np.ndarray)
 NO_OVERLAP = -np.inf
 """Overlap of parts in m at a step that does not look for any."""
 
@@ -66,7 +67,7 @@ class Progress:
 
 @pytree
 class Verdict:
-    """What an agent is told after a step.
+    """What an agent gets after a step.
 
     obs: [O]. reward: []. reason: [] why the episode ended, a `tasks.base.Reason`. done: [] 1 after
     its end. time_out: [] 1 if it ended because its time was up. metrics: [] each, by name.
@@ -107,7 +108,7 @@ class Problem:
     @cached_property
     def settings(self) -> Config:
         """The settings as the program of a run reads them."""
-        with jax.ensure_compile_time_eval():  # whoever asks first may be tracing
+        with jax.ensure_compile_time_eval():  # the first use may be inside a traced function
             return traced(self.config)
 
     @cached_property
@@ -118,10 +119,13 @@ class Problem:
         high = np.where(np.isfinite(joints.high), joints.high, joints.pose_high)
         return low.astype(np.float32), high.astype(np.float32)
 
-    def targets(self, action: jax.Array) -> jax.Array:
-        """Return the target joint angles [J] in rad of an action [J]; beyond -1 and 1 it is cut."""
+    def targets(self, action: Array) -> Array:
+        """Return the target joint angles [J] in rad of an action [J]; beyond -1 and 1 it is cut.
+
+        In JAX or NumPy, as the action is.
+        """
         low, high = self.ranges
-        return low + 0.5 * (jnp.clip(action, -1.0, 1.0) + 1.0) * (high - low)
+        return low + 0.5 * (action.clip(-1.0, 1.0) + 1.0) * (high - low)
 
     def action(self, targets: jax.Array) -> jax.Array:
         """Return the action [J] of target joint angles [J] in rad."""
@@ -141,7 +145,7 @@ class Problem:
     def begin(self, trial: Starts, sensed: Sensed) -> Progress:
         """Return the progress before the first step; a fallen start has ended already."""
         stats, goal = self.task.init(), self.task.goal(trial)
-        reason = self._reason(sensed, goal)
+        reason = reason_of(self.task, sensed, goal)
         return Progress(dataclasses.replace(stats, reason=reason), goal, jnp.zeros(()))
 
     def after(
@@ -154,11 +158,11 @@ class Problem:
         """
         given = (before.stats, sensed, torque, self.task.params(self.settings.fitness))
         updated = self.task.update(*given, before.goal)
-        stats = choose(self._going(before.stats), updated, before.stats)
-        deeper = self._going(stats) & (overlap > stats.overlap)
-        stats = dataclasses.replace(stats, overlap=jnp.where(deeper, overlap, stats.overlap))
+        stats = choose(is_going(before.stats, self.horizon), updated, before.stats)
+        stats = deepened(stats, overlap, self.horizon)
         goal = self.task.next_goal(before.goal, sensed)
-        reason = jnp.where(self._going(stats), self._reason(then, goal), stats.reason)
+        now = reason_of(self.task, then, goal)
+        reason = jnp.where(is_going(stats, self.horizon), now, stats.reason)
         stats = dataclasses.replace(stats, reason=reason)
         return Progress(stats, goal, self._fitness(self._terms(stats)))
 
@@ -167,7 +171,7 @@ class Problem:
         return (before.stats.steps + 1) % CHECK_EVERY == 0
 
     def verdict(self, before: Progress, after: Progress, sensed: Sensed) -> Verdict:
-        """Return what the agent is told after a step that led to this progress and this state.
+        """Return what the agent gets after a step that led to this progress and this state.
 
         The reward is the change of the fitness, so rewards add up to the fitness of the episode.
         """
@@ -235,13 +239,6 @@ class Problem:
         )
         trial = jax.eval_shape(lambda: self.trial(jax.random.key(0)))
         return jax.eval_shape(self.begin, trial, sensed), sensed
-
-    def _going(self, stats: EpisodeStats) -> jax.Array:
-        return (stats.reason == FINISHED) & (stats.steps < self.horizon)
-
-    def _reason(self, sensed: Sensed, goal: Any) -> jax.Array:
-        ended = self.task.ended(sensed, goal)
-        return jnp.where(finite(sensed), ended, NONFINITE).astype(jnp.int32)
 
     def _terms(self, stats: EpisodeStats) -> Mapping[str, jax.Array]:
         terms = self.task.evaluate(stats, self.settings.fitness)

@@ -148,7 +148,7 @@ def load(kind: str, text: str) -> str:
 def loaded() -> tuple[tuple[str, str], ...]:
     """Return kind and `FILE.py:CLASS` of all loaded classes, for other processes to load.
 
-    Classes whose file is gone are left out: a run that needs one says so, others go on.
+    Files that no longer exist are left out. A run that uses one fails with an error of its own.
     """
     return tuple(
         (kind, text)

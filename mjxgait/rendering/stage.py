@@ -265,28 +265,28 @@ class Stage:
             float(-seen[:, 1].min() - 0.5 * size[1]) / np.cos(flat.elevation)
             - 0.03 * self.height / self.scale
         )
-        everyone = np.array([self._path(participant) for participant in self.participants])
+        paths = np.array([self._path(participant) for participant in self.participants])
         # A race needs room behind the leader.
-        behind = 0.0 if len(everyone) == 1 else LAG * self.width / self.scale
+        behind = 0.0 if len(paths) == 1 else LAG * self.width / self.scale
         front = np.column_stack(
-            [everyone[..., 0].max(0) - behind, everyone[..., 1].mean(0), everyone[..., 2].mean(0)]
+            [paths[..., 0].max(0) - behind, paths[..., 1].mean(0), paths[..., 2].mean(0)]
         )
         self.way = smooth(front, round(SMOOTH_SECONDS / self.time_step))
-        self._make_room(everyone)
+        self._make_room(paths)
 
-    def _make_room(self, everyone: np.ndarray) -> None:
+    def _make_room(self, paths: np.ndarray) -> None:
         """Move the camera away, and its middle, if a body leaves the picture in any frame.
 
-        everyone: paths [lanes, frames, 3] m, see `_path`. In a race a body counts as if it were as
-        far as the camera, for those that are left behind leave the picture.
+        paths: paths [lanes, frames, 3] m, see `_path`. In a race a body counts as if it were as
+        far as the camera, because bodies that are left behind leave the picture.
         """
         times = np.arange(self.frames) * self.time_step
         right, up, _ = axes = self.camera(0).axes
         centre = np.array([self.camera(frame).centre for frame in range(self.frames)]) @ axes.T
         sides = np.stack([right, -right, up, -up])
-        alone, reach = len(everyone) == 1, np.zeros((len(everyone), self.frames, 4))
+        alone, reach = len(paths) == 1, np.zeros((len(paths), self.frames, 4))
         for place, (one, lane) in enumerate(zip(self.participants, self.lanes, strict=True)):
-            behind = np.zeros((self.frames, 3)) if alone else self._behind_camera(everyone[place])
+            behind = np.zeros((self.frames, 3)) if alone else self._behind_camera(paths[place])
             reach[place] = one.reach(times, sides) + (lane + behind) @ sides.T
         x, y = centre[:, 0], centre[:, 1]
         # How far a body reaches from the middle of the picture, each way, at the worst moment.
@@ -309,8 +309,9 @@ class Stage:
         return offset
 
     def _path(self, participant: Participant) -> np.ndarray:
-        """Path [frames, 3] m of the middle: ahead of the start, to its left, and the ground's height there; for a
-        swimmer its rise instead.
+        """Path [frames, 3] m of the middle: ahead of the start, to its left, and the ground's height.
+
+        For a swimmer its rise instead of that height.
         """
         steps = [participant.frame(frame * self.time_step) for frame in range(self.frames)]
         middle = participant.middle[steps]

@@ -238,7 +238,7 @@ class Walk:
 
     def body_poses(self, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return world positions [T, nbody, 3] m and rotations [T, nbody, 3, 3] of the bodies."""
-        return _poses(
+        return poses_of(
             self.creature.model,
             self.qpos if frames is None else self.qpos[frames],
             ("xpos", "xmat"),
@@ -246,7 +246,7 @@ class Walk:
 
     def geom_poses(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return world positions [T, G, 3] m and rotations [T, G, 3, 3] of all geoms in `shown`."""
-        return _poses(self.shown, self.qpos[frames], ("geom_xpos", "geom_xmat"))
+        return poses_of(self.shown, self.qpos[frames], ("geom_xpos", "geom_xmat"))
 
 
 def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
@@ -267,9 +267,13 @@ def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     return Walk(creature, champion, dataclasses.replace(film, **kept), fell, start)
 
 
-def _poses(
+def poses_of(
     model: mujoco.MjModel, qpos: np.ndarray, names: tuple[str, str]
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions [T, n, 3] m and rotations [T, n, 3, 3] in poses [T, nq].
+
+    names: of the two arrays in MuJoCo's data, such as xpos and xmat.
+    """
     data = mujoco.MjData(model)
     where, how = ([] for _ in names)
     for row in qpos:

@@ -236,18 +236,10 @@ class Simulator:
         here = (row, episode % count) if own is None else (row, individual, episode % count)
         start = jax.tree.map(lambda leaf: leaf[here], starts if own is None else own)
         mine = jax.tree.map(lambda leaf: leaf[row], settings)
-        still, joints = jnp.zeros_like(start.qvel), len(self.creature.joints.names)
+        joints = len(self.creature.joints.names)
         return Lane(
             job=job,
-            body=BodyState(
-                start.qpos,
-                start.qvel,
-                warmstart=still,
-                constraint_force=still,
-                friction=start.friction,
-                parameters=start.numbers,
-                ground=start.ground,
-            ),
+            body=first_body(start),
             plan=jax.tree.map(lambda leaf: leaf[row, individual], plans),
             memory=self.controller.init(),
             stats=self.task.init(),
@@ -307,21 +299,16 @@ class Simulator:
 
     def _look_for_overlap(self, lane: Lane) -> Lane:
         """Record the deepest overlap of parts where an episode is still running."""
-        stats, depth = lane.stats, self.plant.overlap(lane.body)
-        going = (stats.reason == FINISHED) & (stats.steps < self.steps)
-        # A comparison, not a maximum: the next step handles a state that is NaN.
-        deeper = jnp.where(going & (depth > stats.overlap), depth, stats.overlap)
-        return dataclasses.replace(lane, stats=dataclasses.replace(stats, overlap=deeper))
+        depth = self.plant.overlap(lane.body)
+        return dataclasses.replace(lane, stats=deepened(lane.stats, depth, self.steps))
 
     def reason(self, sensed: Sensed, goal: object) -> jax.Array:
         """Return why [] an episode ends now; `FINISHED` while it goes on."""
-        ended = self.task.ended(sensed, goal)
-        return jnp.where(finite(sensed), ended, NONFINITE).astype(jnp.int32)
+        return reason_of(self.task, sensed, goal)
 
     def _evaluate(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
         """Update the statistics after a step, unless the episode has ended."""
-        stats = lane.stats
-        going = (stats.reason == FINISHED) & (stats.steps < self.steps)
+        stats, going = lane.stats, is_going(lane.stats, self.steps)
         reason = self.reason(sensed, lane.goal)
         updated = self.task.update(stats, sensed, torque, lane.params, lane.goal)
         kept = dataclasses.replace(stats, reason=jnp.where(going, reason, stats.reason))
@@ -331,10 +318,40 @@ class Simulator:
         return per_lane(self.plant, function)
 
 
-def finite(sensed: Sensed) -> jax.Array:
-    """Tell whether [] all that a step depends on is finite."""
+def first_body(start: Starts) -> BodyState:
+    """Return the body at the start of an episode; start: of one trial, or of lanes."""
+    still = jnp.zeros_like(start.qvel)
+    return BodyState(
+        start.qpos,
+        start.qvel,
+        warmstart=still,
+        constraint_force=still,
+        friction=start.friction,
+        parameters=start.numbers,
+        ground=start.ground,
+    )
+
+
+def reason_of(task: Task, sensed: Sensed, goal: object) -> jax.Array:
+    """Return why [] a task's episode ends now; `FINISHED` while it goes on."""
+    ended = task.ended(sensed, goal)
     seen = (sensed.joint_vel, sensed.trunk_pos, sensed.trunk_rot, sensed.bias)
-    return jnp.isfinite(sum(jnp.sum(part) for part in seen))
+    finite = jnp.isfinite(sum(jnp.sum(part) for part in seen))
+    return jnp.where(finite, ended, NONFINITE).astype(jnp.int32)
+
+
+def is_going(stats: EpisodeStats, steps: int) -> jax.Array:
+    """Tell whether [] an episode of so many steps has not ended."""
+    return (stats.reason == FINISHED) & (stats.steps < steps)
+
+
+def deepened(stats: EpisodeStats, depth: jax.Array, steps: int) -> EpisodeStats:
+    """Return the statistics with an overlap of parts [] in m, if it is the deepest of an episode.
+
+    A comparison, not a maximum: the next step handles a state that is NaN.
+    """
+    deeper = is_going(stats, steps) & (depth > stats.overlap)
+    return dataclasses.replace(stats, overlap=jnp.where(deeper, depth, stats.overlap))
 
 
 def choose(condition: jax.Array, yes: Tree, no: Tree) -> Tree:

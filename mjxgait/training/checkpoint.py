@@ -31,6 +31,7 @@ from mjxgait.training.stored import (
     stored_generations,
     try_room,
 )
+from mjxgait.types import by_name
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -113,8 +114,7 @@ def _by_name(state: EvolutionState) -> dict[str, Shaped]:
         if isinstance(key, jax.ShapeDtypeStruct)
         else jax.random.key_data(key)
     )
-    leaves, _ = jax.tree_util.tree_flatten_with_path(dataclasses.replace(state, key=plain))
-    return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
+    return by_name(dataclasses.replace(state, key=plain))
 
 
 def _check_shapes(found: Mapping[str, Shaped], wanted: Mapping[str, Shaped], where: str) -> None:
@@ -127,13 +127,18 @@ def _check_shapes(found: Mapping[str, Shaped], wanted: Mapping[str, Shaped], whe
         {name: (tuple(leaf.shape), str(np.dtype(leaf.dtype))) for name, leaf in tree.items()}
         for tree in (found, wanted)
     )
-    for name in sorted(there.keys() | here.keys()):
-        if there.get(name) != here.get(name):
-            raise UserError(
-                f"{where}: does not fit the settings of this run: {name} is "
-                f"{there.get(name, 'missing')}, the settings ask for {here.get(name, 'nothing')}; "
-                "resume with the settings it was written with"
-            )
+    if name := first_difference(there, here):
+        raise UserError(
+            f"{where}: does not fit the settings of this run: {name} is "
+            f"{there.get(name, 'missing')}, the settings ask for {here.get(name, 'nothing')}; "
+            "resume with the settings it was written with"
+        )
+
+
+def first_difference(one: Mapping[str, object], other: Mapping[str, object]) -> str | None:
+    """Return the first name, in alphabetical order, whose values differ; None if none do."""
+    names = sorted(one.keys() | other.keys())
+    return next((name for name in names if one.get(name) != other.get(name)), None)
 
 
 OVERHEAD = 2**18

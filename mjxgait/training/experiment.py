@@ -34,7 +34,7 @@ from mjxgait.training.stages import (
     lower_stages,
     lowered,
 )
-from mjxgait.types import RequestedTrials, Tree
+from mjxgait.types import RequestedTrials, Tree, by_name
 
 
 @dataclasses.dataclass(frozen=True)
@@ -180,11 +180,7 @@ class Experiment:
 
 def arrays_of(genome: object) -> dict[str, np.ndarray]:
     """Return the arrays of a genome by dotted name, as in checkpoints."""
-    leaves = jax.tree_util.tree_leaves_with_path(genome)
-    return {
-        jax.tree_util.keystr(path, simple=True, separator="."): np.asarray(leaf)
-        for path, leaf in leaves
-    }
+    return {name: np.asarray(leaf) for name, leaf in by_name(genome).items()}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -210,7 +210,7 @@ def next_starts(task: Task, row: RunParams, state: EvolutionState) -> Starts:
 
 
 def _of_round(row: RunParams, number: jax.Array) -> Starts:
-    """Return the nominal start, and those of the others whose turn it is in a round."""
+    """Return the nominal start and the disturbed starts of a round."""
     others = row.settings.rollout.starts - 1
     turn = 1 + (number * others + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
     places = jnp.append(0, turn)

@@ -17,9 +17,11 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.files import DamagedFile, read_bytes, write_bytes
-from mjxgait.training.experiment import Experiment, arrays_of, build_experiment
+from mjxgait.training.checkpoint import first_difference
+from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import open_run
 from mjxgait.training.stored import disk_errors, read_stored
+from mjxgait.types import by_name
 
 INITIAL = "initial.npz"
 """File in a run folder: the arrays [N, ...] of these genomes by dotted name."""
@@ -81,21 +83,13 @@ def check_initial(initial: Initial, experiment: Experiment) -> None:
             f"{initial.source}: its controller observes {', '.join(initial.reads)}, that of the "
             f"new run {', '.join(controller.reads)}"
         )
-    wanted = _shapes(arrays_of_shapes(experiment))
-    found = _shapes(initial.genomes)
-    for name in sorted(found.keys() | wanted.keys()):
-        if found.get(name) != wanted.get(name):
-            raise UserError(
-                f"{initial.source}: its genomes have {name} of shape {found.get(name, 'none')}, "
-                f"the new run's {wanted.get(name, 'none')}; give the new run the same settings of "
-                "the controller"
-            )
-
-
-def arrays_of_shapes(experiment: Experiment) -> dict[str, jax.ShapeDtypeStruct]:
-    """Return the shapes of a run's genomes by dotted name."""
-    leaves = jax.tree_util.tree_leaves_with_path(experiment.abstract().genomes)
-    return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
+    wanted, found = _shapes(by_name(experiment.abstract().genomes)), _shapes(initial.genomes)
+    if name := first_difference(found, wanted):
+        raise UserError(
+            f"{initial.source}: its genomes have {name} of shape {found.get(name, 'none')}, "
+            f"the new run's {wanted.get(name, 'none')}; give the new run the same settings of "
+            "the controller"
+        )
 
 
 def keep_initial(folder: Path, initial: Initial) -> None:
@@ -128,12 +122,12 @@ def planted(state: EvolutionState, genomes: Genomes) -> EvolutionState:
     Raises:
       UserError: the genomes have other shapes.
     """
-    own = arrays_of(state.genomes)
-    if {n: a.shape[1:] for n, a in own.items()} != {n: a.shape[1:] for n, a in genomes.items()}:
+    own = by_name(state.genomes)
+    if _shapes(own) != _shapes(genomes):
         raise DamagedFile(f"{INITIAL}: its genomes do not fit the settings of this run")
     count = min(len(state.fitness), *(len(array) for array in genomes.values()))
     leaves = [
-        jnp.asarray(leaf).at[:count].set(jnp.asarray(genomes[name][:count], leaf.dtype))
+        leaf.at[:count].set(jnp.asarray(genomes[name][:count], leaf.dtype))
         for name, leaf in own.items()
     ]
     made = jax.tree.unflatten(jax.tree.structure(state.genomes), leaves)

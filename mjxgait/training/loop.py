@@ -214,8 +214,8 @@ def _evolve(
     """
     config, creature = examiner.experiment.config, examiner.experiment.creature
     looks, saved, examined = Validation(examiner), generations.generation, None
+    state = generations.row()
     while True:
-        state = generations.row()
         reason, generation = stop_reason(state, config.evolution), int(state.generation)
         over = reason is not None or interrupted.is_set()
         saves = generation > saved and generation % config.checkpoint_every == 0
@@ -238,7 +238,7 @@ def _evolve(
         if over:
             break
         looks.begin(state)
-        _generation(folder, examiner.experiment, generations, screen)
+        state = _generation(folder, examiner.experiment, generations, screen)
     if generation > saved:
         checkpoints.save(state, creature.name, creature.digest)
     return state, reason, examined
@@ -246,15 +246,17 @@ def _evolve(
 
 def _generation(
     folder: Path, experiment: Experiment, generations: Generations, screen: Screen
-) -> None:
-    """Run one generation, append it to the log and write its best as champion."""
-    for line in generations.advance():
+) -> EvolutionState:
+    """Run one generation, append it to the log and write its best as champion; return the state."""
+    lines, state = generations.advance(), generations.row()
+    for line in lines:
         append_lines(folder / METRICS, [line])
         if line["best"] is not None:
-            champion = experiment.champion(generations.row(), versions())
+            champion = experiment.champion(state, versions())
             with disk_errors(folder):
                 write_champion(champion, experiment.creature, folder / CHAMPION)
         screen.generation(line, experiment.config)
+    return state
 
 
 @contextmanager

@@ -15,7 +15,7 @@ import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.clips.clip import NOTE
 from mjxgait.animation.export.footfalls import contacts
-from mjxgait.animation.export.gltf import Buffer, add_floor, add_tiles
+from mjxgait.animation.export.gltf import Buffer, add_channel, add_floor, add_tiles, facts_of
 from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.skeleton import (
     STILL,
@@ -87,12 +87,7 @@ def build_glb(
     document, buffer = _scene({"walk": loop}, travelling)
     if floor:
         add_floor(document, buffer, loop)
-    document.extras = {
-        "strides": loop.strides,
-        "speed_m_per_s": loop.speed,
-        "frames_per_s": loop.rate,
-        "travelling": travelling,
-    }
+    document.extras = facts_of(loop, travelling)
     if footfalls:
         feet = loop.walk.creature.feet.names
         document.animations[0].extras = {"contacts": contacts(loop, feet)}
@@ -244,14 +239,8 @@ def _add_animations(
         animation = gltf.Animation(name=name)
         times = buffer.add(loop.times.astype(np.float32), bounds=True)
         for b, i in moving:
-            target = gltf.AnimationChannelTarget(node=b, path=("translation", "rotation")[i])
-            animation.channels.append(
-                gltf.AnimationChannel(sampler=len(animation.samplers), target=target)
-            )
-            output = buffer.add(tracks[name][i][:, b].astype(np.float32))
-            animation.samplers.append(
-                gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
-            )
+            path = ("translation", "rotation")[i]
+            add_channel(buffer, animation, times, b, path, tracks[name][i][:, b])
         document.animations.append(animation)
 
 

@@ -67,6 +67,32 @@ class Buffer:
         self.document.set_binary_blob(bytes(self.blob))
 
 
+def facts_of(loop: WalkLoop, travelling: bool, units: float = 1.0) -> dict[str, Any]:
+    """The facts of a loop that files state. units: of the file, per m."""
+    return {
+        "strides": loop.strides,
+        "speed_m_per_s": units * loop.speed,
+        "frames_per_s": loop.rate,
+        "travelling": travelling,
+    }
+
+
+def add_channel(
+    buffer: Buffer, animation: gltf.Animation, times: int, node: int, path: str, values: np.ndarray
+) -> None:
+    """Add key frames of a node to an animation.
+
+    times: number of the accessor with their times. path: translation or rotation. values: [F, 3 or
+    4].
+    """
+    target = gltf.AnimationChannelTarget(node=node, path=path)
+    sampler, output = len(animation.samplers), buffer.add(values.astype(np.float32))
+    animation.channels.append(gltf.AnimationChannel(sampler=sampler, target=target))
+    animation.samplers.append(
+        gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
+    )
+
+
 HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
 """Magic, version and length of a file; length and kind of a chunk."""
 JSON, BINARY = b"JSON", b"BIN\0"

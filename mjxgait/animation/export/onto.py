@@ -1,8 +1,9 @@
-"""A walk as an animation of the user's own character, whose skeleton the creature was made of.
+"""A walk as an animation of the user's own character.
 
-Nothing of the file changes; key frames follow at its end. At rest the parts of the creature are
-where the bones are, so a bone turns from its rest as its part does. Letters: `F` key frames, `B`
-parts that have a bone, `N` nodes of the file.
+The creature was imported from the skeleton of that character. Nothing of the file changes; key
+frames follow at its end. At rest the parts of the creature are where the bones are, so a bone turns
+from its rest as its part does. Letters: `F` key frames, `B` parts that have a bone, `N` nodes of
+the file.
 """
 
 import dataclasses
@@ -18,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from mjxgait.animation.clips.read_glb import DAMAGED, name_of
 from mjxgait.animation.export.character import Character
 from mjxgait.animation.export.footfalls import contacts
-from mjxgait.animation.export.gltf import Buffer, added
+from mjxgait.animation.export.gltf import Buffer, add_channel, added, facts_of
 from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.skeleton import (
     STILL,
@@ -282,22 +283,10 @@ def _finished(
     times = buffer.add(loop.times.astype(np.float32), bounds=True)
     for node, found in tracks.items():
         for path, values in found:
-            target = gltf.AnimationChannelTarget(node=node, path=path)
-            sampler = len(animation.samplers)
-            animation.channels.append(gltf.AnimationChannel(sampler=sampler, target=target))
-            output = buffer.add(values.astype(np.float32))
-            animation.samplers.append(
-                gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
-            )
+            add_channel(buffer, animation, times, node, path, values)
     names_of = {part: name_of(character.nodes, node) for part, node in bones.items()}
     feet = [names_of.get(foot, foot) for foot in loop.walk.creature.feet.names]
-    animation.extras = {
-        "strides": loop.strides,
-        "speed_m_per_s": fit.factor * loop.speed,
-        "frames_per_s": loop.rate,
-        "travelling": travelling,
-        "contacts": contacts(loop, feet),
-    }
+    animation.extras = facts_of(loop, travelling, fit.factor) | {"contacts": contacts(loop, feet)}
     document.animations.append(animation)
     # glTF allows no key frames for a node that is placed by a matrix.
     nodes = {node: _unmatrixed(character, node) for node in tracks if character.nodes[node].matrix}

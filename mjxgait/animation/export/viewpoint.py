@@ -1,12 +1,12 @@
 """Place of a page's camera from which every frame of a loop is in the picture."""
 
-import mujoco
 import numpy as np
 
 from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.skeleton import gltf_axes
 from mjxgait.rendering.painter import seen_geoms
 from mjxgait.rendering.shapes import Silhouettes
+from mjxgait.rendering.walk import poses_of
 
 ORBITS = np.radians([[-62.0, 76.0], [-90.0, 86.0], [0.0, 84.0], [-90.0, 8.0]])
 """Azimuth and angle from the vertical of the page's views, as in `page.html`."""
@@ -60,16 +60,11 @@ class _Reach:
 
     def __init__(self, loop: WalkLoop) -> None:
         model = loop.walk.dressed
-        geoms, data = seen_geoms(model), mujoco.MjData(model)
+        geoms = seen_geoms(model)
         self.outlines = Silhouettes(model, geoms)
         self.axes = gltf_axes(loop.walk.forward)
-        where, how = [], []
-        for qpos in loop.qpos:
-            data.qpos[:] = qpos
-            mujoco.mj_kinematics(model, data)
-            where.append(data.geom_xpos[geoms])
-            how.append(data.geom_xmat[geoms].reshape(-1, 3, 3))
-        self.pos, self.rot = np.array(where), np.array(how)
+        pos, rot = poses_of(model, loop.qpos, ("geom_xpos", "geom_xmat"))
+        self.pos, self.rot = pos[:, geoms], rot[:, geoms]
 
     def along(self, directions: np.ndarray) -> np.ndarray:
         """Return the largest products [K] of points with directions [K, 3] in glTF's axes."""
