@@ -71,10 +71,7 @@ def compile_apart(
         raise slow
     head, _, body = done.stdout.partition(b"\n")
     if done.returncode or not head:
-        raise UserError(
-            "MuJoCo ended abnormally or ran out of memory while it compiled the model "
-            f"({gigabytes:g} GB); simplify its meshes, or allow more with --gigabytes"
-        )
+        raise UserError(_abnormal(gigabytes))
     answer = json.loads(head)
     if "error" in answer:
         raise UserError(answer["error"])
@@ -198,7 +195,16 @@ def _bound(seconds: float, gigabytes: float) -> None:
         pass
 
 
+def _abnormal(gigabytes: float) -> str:
+    return (
+        "MuJoCo ended abnormally or ran out of memory while it compiled the model "
+        f"({gigabytes:g} GB); simplify its meshes, or allow more with --gigabytes"
+    )
+
+
 def _reason(error: Exception, gigabytes: float) -> str:
+    if "unknown exception" in str(error):  # some of MuJoCo's parts say so without memory
+        return _abnormal(gigabytes)
     short = isinstance(error, MemoryError) or "allocate memory" in str(error)
     return (
         f"compiling the model takes more than {gigabytes:g} GB of memory; simplify its meshes, or "

@@ -52,25 +52,55 @@ class Starts:
     delay: jax.Array | None = None
 
 
+@pytree
+class _Drawn:
+    """Random part of `Starts`. stiff, damped, heavy: the factors' parts in [-1, 1)."""
+
+    qpos: jax.Array
+    qvel: jax.Array
+    friction: jax.Array
+    push: jax.Array
+    push_step: jax.Array
+    stiff: jax.Array
+    damped: jax.Array
+    heavy: jax.Array
+    delay: jax.Array | None
+
+
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
     """Draw R initial conditions; the same key gives the same ones.
 
     Perturbations are uniform within the half widths of the config.
     """
-    count = config.starts
+    drawn = jax.jit(lambda key: _drawn(key, creature, config))(key)
+    perturbed = (np.arange(config.starts) > 0)[:, None]
+    # NumPy rounds after each operation; a compiler may round a product and a sum once.
+    gains = np.float32(config.gains) * perturbed
+    return Starts(
+        qpos=drawn.qpos,
+        qvel=drawn.qvel,
+        friction=drawn.friction,
+        push=drawn.push,
+        push_step=drawn.push_step,
+        stiffness=_factors(gains, drawn.stiff),
+        damping=_factors(gains, drawn.damped),
+        mass_scale=_mass_scale(drawn.heavy, creature, config),
+        ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
+        delay=drawn.delay,
+    )
+
+
+def _drawn(key: jax.Array, creature: Creature, config: RolloutConfig) -> _Drawn:
+    count, joints = config.starts, creature.joints
     key_pos, key_vel, key_friction, key_direction, key_moment = jax.random.split(key, 5)
     key_stiffness, key_damping = jax.random.split(jax.random.fold_in(key, 1))
     perturbed = (jnp.arange(count) > 0)[:, None]
-    joints = len(creature.joints.names)
-    qpos = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32), (count, 1))
-    noise = (
-        perturbed * config.joint_noise * jax.random.uniform(key_pos, (count, joints), minval=-1.0)
-    )
-    spin = (
-        perturbed
-        * config.velocity_noise
-        * jax.random.uniform(key_vel, (count, joints), minval=-1.0)
-    )
+
+    def spread(key: jax.Array, columns: int = len(joints.names)) -> jax.Array:
+        return jax.random.uniform(key, (count, columns), minval=-1.0)
+
+    noise = perturbed * config.joint_noise * spread(key_pos)
+    spin = perturbed * config.velocity_noise * spread(key_vel)
     friction = jax.random.uniform(
         key_friction, (count,), minval=config.friction[0], maxval=config.friction[1]
     )
@@ -81,23 +111,23 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
     moment = jax.random.randint(
         key_moment, (count,), steps // 4, max(3 * steps // 4, steps // 4 + 1)
     )
-
-    def factors(key: jax.Array) -> jax.Array:
-        spread = jax.random.uniform(key, (count, joints), minval=-1.0)
-        return 1.0 + perturbed * config.gains * spread
-
-    return Starts(
-        qpos=qpos.at[:, creature.joints.qpos_adr].add(noise),
-        qvel=jnp.zeros((count, creature.model.nv)).at[:, creature.joints.dof_adr].set(spin),
+    standing = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32), (count, 1))
+    return _Drawn(
+        qpos=standing.at[:, joints.qpos_adr].add(noise),
+        qvel=jnp.zeros((count, creature.model.nv)).at[:, joints.dof_adr].set(spin),
         friction=jnp.where(perturbed[:, 0], friction, 1.0),
         push=speed * direction @ horizontal_freedoms(creature),
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),
-        stiffness=factors(key_stiffness),
-        damping=factors(key_damping),
-        mass_scale=_mass_scale(jax.random.fold_in(key, 3), creature, config),
-        ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
+        stiff=spread(key_stiffness),
+        damped=spread(key_damping),
+        heavy=spread(jax.random.fold_in(key, 3), creature.model.nbody - 1),
         delay=_delay(jax.random.fold_in(key, 6), config),
     )
+
+
+def _factors(size: np.ndarray, spread: jax.Array) -> jax.Array:
+    """Return 1 plus this share of the spread."""
+    return jnp.asarray(1 + size * np.asarray(spread))
 
 
 def milder(starts: Starts, share: jax.Array) -> Starts:
@@ -128,14 +158,14 @@ def _delay(key: jax.Array, config: RolloutConfig) -> jax.Array | None:
     return jax.random.randint(key, (config.starts,), 0, config.latency + 1).at[0].set(0)
 
 
-def _mass_scale(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:
+def _mass_scale(spread: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:
     if not config.masses:
         return None
-    parts = creature.model.nbody - 1
-    spread = jax.random.uniform(key, (config.starts, parts), minval=-1.0).at[0].set(0.0)
+    size = np.full((config.starts, 1), config.masses, np.float32)
+    size[0] = 0.0
     # Bodies welded to a part share its mass scale.
     carrier = np.maximum(creature.model.body_weldid[1:] - 1, 0)
-    return 1.0 + config.masses * spread[:, carrier]
+    return _factors(size, spread[:, carrier])
 
 
 def draw_grounds(key: jax.Array, creature: Creature, config: RolloutConfig) -> Ground | None:

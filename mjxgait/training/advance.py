@@ -15,6 +15,9 @@ from mjxgait.tasks.base import Task
 from mjxgait.training.experiment import Batch, Step, row_of
 from mjxgait.training.folder import MOTHERS, Line
 
+_row = jax.jit(row_of)
+"""One program instead of one for each shape of an array."""
+
 
 class Generations:
     """Generations of a batch, one at a time.
@@ -45,15 +48,16 @@ class Generations:
         if self.generation < 0:
             return []
         self.steps += int(metrics.sim_steps.sum())
+        genomes = jax.device_get(self.states.genomes)
         return [
             metrics_line(row_of(metrics, row), seconds, one.simulator.task)
-            | followed(one.simulator.controller.numbers(row_of(self.states.genomes, row)))
+            | followed(one.simulator.controller.numbers(row_of(genomes, row)))
             for row, one in enumerate(self._batch.experiments)
         ]
 
     def row(self, row: int = 0) -> EvolutionState:
         """Return the state of one row."""
-        return row_of(self.states, row)
+        return _row(self.states, row)
 
 
 def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> Line:

@@ -69,18 +69,21 @@ class BlocksTask(PlainTask):
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """The root is at the origin; growing the body puts it on the ground."""
         count, joints = settings.starts, len(self.creature.joints.names)
-        bent = settings.joint_noise * jax.random.uniform(key, (count, joints), minval=-1.0)
-        bent = bent * (jnp.arange(count) > 0)[:, None]
-        root = jnp.zeros((count, 7)).at[:, 3].set(1.0)
-        still = jnp.zeros((count, self.creature.nv))
+        drawn = jax.random.uniform(key, (count, joints), minval=-1.0)
+        bent = np.float32(settings.joint_noise) * np.asarray(drawn)
+        bent[0] = 0.0
+        root = np.zeros((count, 7), np.float32)
+        root[:, 3] = 1.0
+        still = jnp.asarray(np.zeros((count, self.creature.nv), np.float32))
+        usual = jnp.asarray(np.ones((count, joints), np.float32))
         return Starts(
-            qpos=jnp.concatenate([root, bent], axis=1),
+            qpos=jnp.asarray(np.concatenate([root, bent], axis=1)),
             qvel=still,
-            friction=jnp.ones(count),
+            friction=jnp.asarray(np.ones(count, np.float32)),
             push=still,
-            push_step=jnp.full(count, NEVER),
-            stiffness=jnp.ones((count, joints)),
-            damping=jnp.ones((count, joints)),
+            push_step=jnp.asarray(np.full(count, NEVER, np.int32)),
+            stiffness=usual,
+            damping=usual,
         )
 
     def params(self, settings: BlocksConfig) -> jax.Array:
