@@ -81,7 +81,9 @@ def _inputs(reference: BrainReference, number: int, lit: bool) -> Iterator[tuple
     """Column and weight of every input that a cell uses."""
     first = min(reference.place.values())
     if number < 0:
-        wires = [(int(reference.driver[-1 - number]), float(reference.gain[-1 - number]))]
+        hinge = -1 - number
+        wires = [(int(reference.driver[hinge]), float(reference.gain[hinge]))]
+        wires += _steering(reference, hinge)
     elif number >= first:
         reads = READS.get(kind_of(reference, number), 1)
         columns, weights = reference.column[number - first], reference.weight[number - first]
@@ -93,12 +95,24 @@ def _inputs(reference: BrainReference, number: int, lit: bool) -> Iterator[tuple
         yield NOTHING if column in seen and not lit else column, weight
 
 
+def _steering(reference: BrainReference, hinge: int) -> list[tuple[int, float]]:
+    """Return column and weight of the light that adds to a hinge's drive; none without `steer`."""
+    if reference.steer is None:
+        return []
+    lights = min(reference.place.values()) - 3 * len(reference.parts)
+    first = lights + 3 * reference.hinges[hinge][0]
+    return [(first + axis, float(w)) for axis, w in enumerate(reference.steer[hinge, 0])]
+
+
 def _cell(reference: BrainReference, number: int, depth: int, lit: bool) -> Cell:
     joints, parts = len(reference.hinges), len(reference.parts)
     given = [_written(column, weight) for column, weight in _inputs(reference, number, lit)]
     if number < 0:
         part, hinge = reference.hinges[-1 - number]
-        driven = "" if given == ["·"] else f" = {given[0]}"
+        driven = "" if given[0] == "·" else f" = {given[0]}"
+        if lit and reference.steer is not None:
+            x, y, z = reference.steer[-1 - number, 1]
+            driven = f" = {given[0]} (1{x:+.1f}x{y:+.1f}y{z:+.1f}z)"
         return Cell(part, "hinge", f"{reference.parts[part].joint} {hinge}{driven}", depth)
     if number < 2 + joints:
         part, hinge = reference.hinges[number - 2]

@@ -1,6 +1,7 @@
 """Initial conditions of the trials, shared by all individuals: first nominal, others perturbed."""
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import jax
@@ -53,8 +54,28 @@ class Starts:
 
 
 @pytree
+class _Spread:
+    """What the drawn numbers are scaled by: the numbers of a config and a creature as inputs, so
+    that all of one shape share a program.
+
+    standing: [nq]. qpos, dofs: [J] addresses of the joints. level: [2, nv] horizontal motion.
+    angle: rad. rate: rad/s. friction: [2]. speed: m/s. moment: [2] steps.
+    """
+
+    standing: np.ndarray
+    qpos: np.ndarray
+    dofs: np.ndarray
+    level: np.ndarray
+    angle: float
+    rate: float
+    friction: tuple[float, float]
+    speed: float
+    moment: tuple[int, int]
+
+
+@pytree
 class _Drawn:
-    """Random part of `Starts`. stiff, damped, heavy: the factors' parts in [-1, 1)."""
+    """Random part of `Starts`. stiff, damped: [R, J], heavy: [R, nbody - 1] in [-1, 1)."""
 
     qpos: jax.Array
     qvel: jax.Array
@@ -64,7 +85,6 @@ class _Drawn:
     stiff: jax.Array
     damped: jax.Array
     heavy: jax.Array
-    delay: jax.Array | None
 
 
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
@@ -72,10 +92,10 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
 
     Perturbations are uniform within the half widths of the config.
     """
-    drawn = jax.jit(lambda key: _drawn(key, creature, config))(key)
-    perturbed = (np.arange(config.starts) > 0)[:, None]
+    drawn = _drawn(key, _spread(creature, config), config.starts, creature.model.nbody - 1)
     # NumPy rounds after each operation; a compiler may round a product and a sum once.
-    gains = np.float32(config.gains) * perturbed
+    gains = np.full((config.starts, 1), config.gains, np.float32)
+    gains[0] = 0.0
     return Starts(
         qpos=drawn.qpos,
         qvel=drawn.qvel,
@@ -86,42 +106,50 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
         damping=_factors(gains, drawn.damped),
         mass_scale=_mass_scale(drawn.heavy, creature, config),
         ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
-        delay=drawn.delay,
+        delay=_delay(jax.random.fold_in(key, 6), config),
     )
 
 
-def _drawn(key: jax.Array, creature: Creature, config: RolloutConfig) -> _Drawn:
-    count, joints = config.starts, creature.joints
+def _spread(creature: Creature, config: RolloutConfig) -> _Spread:
+    steps = round(config.seconds / creature.model.opt.timestep)
+    return _Spread(
+        standing=np.float32(creature.stand_qpos),
+        qpos=creature.joints.qpos_adr,
+        dofs=creature.joints.dof_adr,
+        level=horizontal_freedoms(creature),
+        angle=config.joint_noise,
+        rate=config.velocity_noise,
+        friction=config.friction,
+        speed=config.push * float(np.sqrt(creature.gravity * creature.frame.hip_height)),
+        moment=(steps // 4, max(3 * steps // 4, steps // 4 + 1)),
+    )
+
+
+@partial(jax.jit, static_argnums=(2, 3))
+def _drawn(key: jax.Array, by: _Spread, count: int, parts: int) -> _Drawn:
     key_pos, key_vel, key_friction, key_direction, key_moment = jax.random.split(key, 5)
     key_stiffness, key_damping = jax.random.split(jax.random.fold_in(key, 1))
     perturbed = (jnp.arange(count) > 0)[:, None]
 
-    def spread(key: jax.Array, columns: int = len(joints.names)) -> jax.Array:
+    def spread(key: jax.Array, columns: int = len(by.qpos)) -> jax.Array:
         return jax.random.uniform(key, (count, columns), minval=-1.0)
 
-    noise = perturbed * config.joint_noise * spread(key_pos)
-    spin = perturbed * config.velocity_noise * spread(key_vel)
-    friction = jax.random.uniform(
-        key_friction, (count,), minval=config.friction[0], maxval=config.friction[1]
-    )
+    low, high = by.friction
+    friction = jax.random.uniform(key_friction, (count,), minval=low, maxval=high)
     angle = jax.random.uniform(key_direction, (count,), maxval=2 * jnp.pi)
     direction = perturbed * jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1)
-    speed = config.push * float(np.sqrt(creature.gravity * creature.frame.hip_height))
-    steps = round(config.seconds / creature.model.opt.timestep)
-    moment = jax.random.randint(
-        key_moment, (count,), steps // 4, max(3 * steps // 4, steps // 4 + 1)
-    )
-    standing = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32), (count, 1))
+    moment = jax.random.randint(key_moment, (count,), *by.moment)
+    standing = jnp.tile(by.standing, (count, 1))
+    still = jnp.zeros((count, by.level.shape[1]))
     return _Drawn(
-        qpos=standing.at[:, joints.qpos_adr].add(noise),
-        qvel=jnp.zeros((count, creature.model.nv)).at[:, joints.dof_adr].set(spin),
+        qpos=standing.at[:, by.qpos].add(perturbed * by.angle * spread(key_pos)),
+        qvel=still.at[:, by.dofs].set(perturbed * by.rate * spread(key_vel)),
         friction=jnp.where(perturbed[:, 0], friction, 1.0),
-        push=speed * direction @ horizontal_freedoms(creature),
+        push=by.speed * direction @ by.level,
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),
         stiff=spread(key_stiffness),
         damped=spread(key_damping),
-        heavy=spread(jax.random.fold_in(key, 3), creature.model.nbody - 1),
-        delay=_delay(jax.random.fold_in(key, 6), config),
+        heavy=spread(jax.random.fold_in(key, 3), parts),
     )
 
 

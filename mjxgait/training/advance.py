@@ -15,9 +15,6 @@ from mjxgait.tasks.base import Task
 from mjxgait.training.experiment import Batch, Step, row_of
 from mjxgait.training.folder import MOTHERS, Line
 
-_row = jax.jit(row_of)
-"""One program instead of one for each shape of an array."""
-
 
 class Generations:
     """Generations of a batch, one at a time.
@@ -57,7 +54,8 @@ class Generations:
 
     def row(self, row: int = 0) -> EvolutionState:
         """Return the state of one row."""
-        return _row(self.states, row)
+        # Of arrays on this side of the device, where a row costs no program of its own.
+        return row_of(jax.device_get(self.states), row)
 
 
 def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> Line:

@@ -69,7 +69,7 @@ def generation(
     states: EvolutionState, follows: bool = False
 ) -> tuple[EvolutionState, GenerationMetrics]:
     """Return the same population of one row, one generation later, and metrics of ones."""
-    state = row_of(states)
+    state = row_of(jax.device_get(states))
     outcomes = _made_up(state.outcome.shape[-1])
     later = dataclasses.replace(
         state,

@@ -83,7 +83,8 @@ class Brain:
 
     drive: [n] index of the value that drives a link's hinge. gain: [n] its factor. pull: [n] N·m,
     largest torque (signed). sign: [n] factor from angles to those of the genes. image: [n], -1 in a
-    mirror image.
+    mirror image. lit: [n] index of the link whose light steers a link's hinge, and steer: [n, 2, 3]
+    as in `Nerves`; None without.
     """
 
     kind: jax.Array
@@ -94,6 +95,8 @@ class Brain:
     pull: jax.Array
     sign: jax.Array
     image: jax.Array
+    lit: jax.Array | None = None
+    steer: jax.Array | None = None
 
 
 def first_neuron(links: int) -> int:
@@ -131,6 +134,8 @@ def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
         pull=body.strength * body.sign,
         sign=body.sign,
         image=1.0 - 2.0 * parts.copies[part],
+        lit=None if nerves.steer is None else parts.last[part],
+        steer=None if nerves.steer is None else nerves.steer[node[part], hinge],
     )
 
 
@@ -203,17 +208,15 @@ def thought(brain: Brain, mind: Mind, perceived: Perceived, step: float) -> tupl
     All neurons fire at once, on the values of the previous tick.
     """
     mirrored = jnp.stack([jnp.ones_like(brain.image), brain.image], axis=1)[:, jnp.array([0, 1, 0])]
-    known = jnp.concatenate(
-        [
-            jnp.array([0.0, 1.0]),
-            perceived.angles * brain.sign,
-            perceived.contact,
-            (perceived.light * mirrored).reshape(-1),
-        ]
-    )
+    ends, angles = jnp.array([0.0, 1.0]), perceived.angles * brain.sign
+    light = perceived.light * mirrored
+    known = jnp.concatenate([ends, angles, perceived.contact, light.reshape(-1)])
     values, memory = mind.values, mind.memory
     for _ in range(TICKS):
         inputs = jnp.concatenate([known, values])[brain.source] * brain.weight
         values, memory = fired(brain.kind, inputs, memory, step / TICKS)
-    wanted = jnp.concatenate([known, values])[brain.drive]
-    return brain.pull * jnp.clip(brain.gain * wanted, -1.0, 1.0), Mind(values, memory)
+    wanted = brain.gain * jnp.concatenate([known, values])[brain.drive]
+    if brain.steer is not None:
+        added, factor = jnp.sum(brain.steer * light[brain.lit][:, None], axis=2).T
+        wanted = wanted * (1 + factor) + added
+    return brain.pull * jnp.clip(wanted, -1.0, 1.0), Mind(values, memory)

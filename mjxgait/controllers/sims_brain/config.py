@@ -6,6 +6,7 @@ from typing import Annotated
 import pydantic
 
 from mjxgait.config.tables import (
+    ADDED,
     SHAPE,
     STRICT,
     Fraction,
@@ -38,6 +39,8 @@ class BrainConfig:
       crossover: share of two-parent offspring with crossed nodes.
       grafting: share with a graft of the second parent; the others have one parent.
       drawn: whether bodies stay as first drawn and only brains evolve.
+      steer: whether the light's direction also acts on each hinge directly, past the neurons; ours,
+        not Sims'.
     """
 
     __pydantic_config__ = STRICT
@@ -56,3 +59,4 @@ class BrainConfig:
     crossover: Fraction = 0.3
     grafting: Fraction = 0.3
     drawn: bool = False
+    steer: Annotated[bool, SHAPE, ADDED] = False

@@ -47,7 +47,7 @@ class Brains:
     def __init__(self, step: float, settings: BrainConfig, added: Sequence[str] = ()) -> None:
         self.every, self.capacity = settings.every, capacity_of(settings)
         self.pause = step * settings.every
-        self.room = NerveRoom(settings.local, settings.central)
+        self.room = NerveRoom(settings.local, settings.central, settings.steer)
         self.reads = ("joint_pos", "contact", *([LIGHT] if LIGHT in added else []))
 
     def variation(self, settings: BrainConfig, evolution: EvolutionConfig) -> Variation:

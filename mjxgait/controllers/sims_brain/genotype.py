@@ -140,6 +140,8 @@ def random_graph(key: jax.Array, capacity: Capacity, ranges: Ranges) -> Graph:
     )
 
 
+STEER = (-1.0, 1.0)
+"""Range of `Nerves.steer`. A hinge's drive is limited to this range."""
 CONSTANT, WAVE = 0.3, 0.3
 """Shares of inputs drawn as constants, and of neurons drawn as waves. With uniform draws a wave of
 constant frequency drives only one effector in 400."""
@@ -147,10 +149,11 @@ constant frequency drives only one effector in 400."""
 
 @dataclasses.dataclass(frozen=True)
 class NerveRoom:
-    """Numbers of neurons per node, and of central neurons."""
+    """Numbers of neurons per node, and of central neurons. steer: see `BrainConfig`."""
 
     local: int = BrainConfig.local
     central: int = BrainConfig.central
+    steer: bool = BrainConfig.steer
 
     @property
     def codes(self) -> int:
@@ -167,6 +170,8 @@ class Nerves:
 
     A source is a number: 0 for the constant 1; then the part's own sensors, its own neurons, its
     parent's, its first child's, and the central ones.
+    steer: [N, 3, 2, 3] weights by which the light's direction, along the axes of the part's block,
+    adds to each hinge's drive and changes its size; None without `NerveRoom.steer`.
     """
 
     kind: jax.Array
@@ -174,6 +179,7 @@ class Nerves:
     weight: jax.Array
     effect_source: jax.Array
     effect_weight: jax.Array
+    steer: jax.Array | None = None
 
 
 @pytree
@@ -188,10 +194,14 @@ class Centre:
 def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
     """Draw random neurons: any function, any source; weights are normal."""
     effects = {"effect_source": (nodes, 3), "effect_weight": (nodes, 3)}
-    drawn = numbers(key, _shapes((nodes, room.local)) | effects)
+    steer = {"steer": (nodes, 3, 2, 3)} if room.steer else {}
+    drawn = numbers(key, _shapes((nodes, room.local)) | effects | steer)
     source = numbered(drawn["effect_source"], room.codes)
     return Nerves(
-        **_neurons(drawn, room), effect_source=source, effect_weight=normal(drawn["effect_weight"])
+        **_neurons(drawn, room),
+        effect_source=source,
+        effect_weight=normal(drawn["effect_weight"]),
+        steer=between(drawn["steer"], STEER) if room.steer else None,
     )
 
 

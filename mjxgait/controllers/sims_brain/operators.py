@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.genotype import (
+    STEER,
     Capacity,
     Centre,
     Graph,
@@ -159,6 +160,8 @@ class Kin:
         found = [(-4.0, 4.0)] * shape.num_leaves
         for name, bounds in names.items():
             found[getattr(placed.graph, name)] = bounds
+        if placed.nerves.steer is not None:
+            found[placed.nerves.steer] = STEER
         return found
 
 

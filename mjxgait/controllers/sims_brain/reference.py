@@ -123,6 +123,7 @@ class BrainReference:
         self.driver = np.array([column for column, _, _ in pulls])
         self.gain = np.array([gain for _, gain, _ in pulls])
         self.strength = np.array([strength for _, _, strength in pulls])
+        self.steer = self._steer(genome.get("nerves.steer"))
 
     def init(self, count: int) -> Memory:
         """See `ReferenceController`."""
@@ -142,6 +143,10 @@ class BrainReference:
                 after[:, these], kept_after[:, these] = fire(kind, three, kept[:, these], dt)
             values, kept = after, kept_after
         wanted = self.gain * np.concatenate([sensed, values], axis=1)[:, self.driver]
+        if self.steer is not None and "light" in senses:
+            light = senses["light"][:, [part for part, _ in self.hinges]]
+            wanted = wanted * (1 + (light * self.steer[:, 1]).sum(2))
+            wanted = wanted + (light * self.steer[:, 0]).sum(2)
         torque = self.strength * np.clip(wanted, -1.0, 1.0)
         return torque, {"values": values, "memory": kept}
 
@@ -204,6 +209,14 @@ class BrainReference:
         column, sign = self._source(part, code)
         weight = sign * float(self.genome["nerves.effect_weight"][own.node, hinge])
         return column, weight, own.strength * _sign(own, hinge)
+
+    def _steer(self, genes: np.ndarray | None) -> np.ndarray | None:
+        """Return the weights [J, 2, 3] of the light; a mirror image observes a mirrored light."""
+        if genes is None:
+            return None
+        own = [genes[self.parts[part].node, hinge] for part, hinge in self.hinges]
+        flips = [(1.0, -1.0 if self.parts[part].mirrored else 1.0, 1.0) for part, _ in self.hinges]
+        return np.reshape(own, (-1, 2, 3)) * np.reshape(flips, (-1, 1, 3))
 
 
 def _sign(part: Part, hinge: int) -> float:

@@ -26,7 +26,7 @@ from mjxgait.rendering.brain import READS, draw_brain, kind_of, network_of, shap
 from mjxgait.rendering.curves import figure
 from mjxgait.training.experiment import arrays_of
 
-CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(), 200, 0.01
+CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(steer=True), 200, 0.01
 KIN = Kin(CAPACITY, ROOM, Ranges())
 FIRED = jax.jit(fired, static_argnums=3)
 

@@ -13,7 +13,7 @@ from controllers.sims_brain.made_up import one
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.controller import Brains
-from mjxgait.controllers.sims_brain.genotype import Capacity, NerveRoom, Ranges
+from mjxgait.controllers.sims_brain.genotype import STEER, Capacity, NerveRoom, Ranges
 from mjxgait.controllers.sims_brain.growth import grown
 from mjxgait.controllers.sims_brain.operators import (
     Genotype,
@@ -24,7 +24,7 @@ from mjxgait.controllers.sims_brain.operators import (
 from mjxgait.controllers.sims_brain.reference_body import JOINTS, NEURONS
 from mjxgait.evolution.chance import key_of
 
-CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(), Ranges(), 2000
+CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(steer=True), Ranges(), 2000
 KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))
 BUSY = ("mutate", "cross", "graft")
 ALIVE = jax.jit(jax.vmap(reachable))
@@ -73,6 +73,7 @@ def test_children_are_graphs_within_their_ranges(bred: Genotype):
         *((part.kind, 0, len(NEURONS) - 1) for part in (nerves, centre)),
         *((part.source, 0, ROOM.codes - 1) for part in (nerves, centre)),
         (nerves.effect_source, 0, ROOM.codes - 1),
+        (nerves.steer, *STEER),
     ]
     for values, low, high in bounds:
         assert np.isfinite(values).all()
@@ -211,7 +212,7 @@ FREE = pytest.mark.thorough("other tests here have bodies that vary")
 @pytest.mark.parametrize("drawn", [True, pytest.param(False, marks=FREE)])
 def test_a_child_keeps_its_mothers_drawn_body(parents: tuple[Genotype, Genotype], drawn: bool):
     """Under any operator; the brain still varies."""
-    controller = Brains(0.01, BrainConfig())
+    controller = Brains(0.01, BrainConfig(steer=True))
     bred = controller.variation(BrainConfig(drawn=drawn), EvolutionConfig())
     keys = jax.random.split(key_of(3), 200)
     few = [jax.tree.map(lambda leaf: leaf[:200], parent) for parent in parents]

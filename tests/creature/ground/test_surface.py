@@ -22,7 +22,7 @@ from mjxgait.creature.ground.surface import (
 )
 from mjxgait.evolution.chance import key_of
 from mjxgait.reference.terrain import terrain_of
-from mjxgait.tasks.starts import Starts, draw_starts
+from mjxgait.tasks.starts import Starts, draw_grounds, draw_starts
 
 TEXTS = (
     "slope:0.2",
@@ -37,8 +37,11 @@ TEXTS = (
 
 
 def drawn(creature: Creature, config: RolloutConfig) -> Starts:
-    """Starts, compiled as a whole: otherwise hundreds of operations compile one by one."""
-    return jax.jit(lambda key: draw_starts(key, creature, config))(key_of(0))
+    """Starts, the ground compiled as a whole: otherwise hundreds of operations compile alone."""
+    level = dataclasses.replace(config, ground="flat", slope=0.0, rough=0.0)
+    lay = jax.jit(lambda key: draw_grounds(jax.random.fold_in(key, 2), creature, config))
+    starts = draw_starts(key_of(0), creature, level)
+    return dataclasses.replace(starts, ground=lay(key_of(0)))
 
 
 def laid(creature: Creature, text: str) -> Ground:
