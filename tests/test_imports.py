@@ -199,7 +199,11 @@ def test_compiled_code_leaves_mujoco_to_the_physics(own: str):
 
 
 def test_only_one_file_calls_jit():
-    """A run has one program: a second jit elsewhere would be a second compilation."""
+    """A run has one program: a second jit elsewhere would be a second compilation.
+
+    Random keys and initial conditions are drawn before, once for a run. Without a program of their
+    own, each of their 60 operations would be compiled alone.
+    """
     ours = [
         PACKAGE / name for name in ("controllers", "tasks", "evolution", "simulation", "training")
     ]
@@ -209,4 +213,4 @@ def test_only_one_file_calls_jit():
         for path in folder.rglob("*.py")
         if "jax.jit" in path.read_text(encoding="utf-8")
     }
-    assert calls <= {"stages.py"}
+    assert calls <= {"stages.py", "chance.py", "starts.py"}

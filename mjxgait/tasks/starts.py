@@ -93,7 +93,7 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
     Perturbations are uniform within the half widths of the config.
     """
     drawn = _drawn(key, _spread(creature, config), config.starts, creature.model.nbody - 1)
-    # NumPy rounds after each operation; a compiler may round a product and a sum once.
+    # Outside the program, which may round a product and a sum once instead of twice.
     gains = np.full((config.starts, 1), config.gains, np.float32)
     gains[0] = 0.0
     return Starts(
@@ -155,7 +155,7 @@ def _drawn(key: jax.Array, by: _Spread, count: int, parts: int) -> _Drawn:
 
 def _factors(size: np.ndarray, spread: jax.Array) -> jax.Array:
     """Return 1 plus this share of the spread."""
-    return jnp.asarray(1 + size * np.asarray(spread))
+    return 1 + size * spread
 
 
 def milder(starts: Starts, share: jax.Array) -> Starts:

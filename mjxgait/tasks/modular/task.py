@@ -69,15 +69,15 @@ class BlocksTask(PlainTask):
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """The root is at the origin; growing the body puts it on the ground."""
         count, joints = settings.starts, len(self.creature.joints.names)
-        drawn = jax.random.uniform(key, (count, joints), minval=-1.0)
-        bent = np.float32(settings.joint_noise) * np.asarray(drawn)
-        bent[0] = 0.0
+        noise = np.full((count, 1), settings.joint_noise, np.float32)
+        noise[0] = 0.0
+        bent = noise * jax.random.uniform(key, (count, joints), minval=-1.0)
         root = np.zeros((count, 7), np.float32)
         root[:, 3] = 1.0
         still = jnp.asarray(np.zeros((count, self.creature.nv), np.float32))
         usual = jnp.asarray(np.ones((count, joints), np.float32))
         return Starts(
-            qpos=jnp.asarray(np.concatenate([root, bent], axis=1)),
+            qpos=jnp.concatenate([root, bent], axis=1),
             qvel=still,
             friction=jnp.asarray(np.ones(count, np.float32)),
             push=still,
