@@ -66,7 +66,7 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(100_000, 20, 20)
 
 
-MOST_MEMORY = 2 * 2**30
+MOST_MEMORY = max(2 * 2**30, psutil.virtual_memory().total // 6)
 """Bytes of a worker above which compiled programs are dropped; the disk cache keeps them."""
 
 
