@@ -4,6 +4,8 @@ import signal
 import subprocess
 import sys
 
+import psutil
+
 from mjxgait.processes import process_per_core
 
 LOSES_ONE = """
@@ -33,6 +35,26 @@ def test_a_process_killed_at_its_start_is_not_waited_for():
         [sys.executable, "-c", LOSES_ONE], capture_output=True, text=True, timeout=60, check=False
     )
     assert done.stdout.split() == ["lost"] * 8, done.stderr
+
+
+WAITS = """
+import os, time
+from mjxgait.processes import process_per_core
+
+with process_per_core(2) as pool:
+    print(*{pool.submit(os.getpid).result() for _ in range(9)}, flush=True)
+    time.sleep(60)
+"""
+
+
+def test_processes_end_with_a_killed_parent():
+    """Without work they would wait for it forever, with all their memory."""
+    with subprocess.Popen([sys.executable, "-c", WAITS], stdout=subprocess.PIPE, text=True) as run:
+        assert run.stdout is not None
+        children = [psutil.Process(int(number)) for number in run.stdout.readline().split()]
+        run.kill()
+    assert children
+    assert not psutil.wait_procs(children, timeout=20)[1]
 
 
 def test_ctrl_c_does_not_reach_a_process_that_is_importing():
