@@ -113,7 +113,7 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
 def _spread(creature: Creature, config: RolloutConfig) -> _Spread:
     steps = round(config.seconds / creature.model.opt.timestep)
     return _Spread(
-        standing=np.float32(creature.stand_qpos),
+        standing=np.asarray(creature.stand_qpos, np.float32),
         qpos=creature.joints.qpos_adr,
         dofs=creature.joints.dof_adr,
         level=horizontal_freedoms(creature),
@@ -155,7 +155,7 @@ def _drawn(key: jax.Array, by: _Spread, count: int, parts: int) -> _Drawn:
 
 def _factors(size: np.ndarray, spread: jax.Array) -> jax.Array:
     """Return 1 plus this share of the spread."""
-    return 1 + size * spread
+    return 1 + jnp.asarray(size) * spread
 
 
 def milder(starts: Starts, share: jax.Array) -> Starts:
