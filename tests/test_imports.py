@@ -208,9 +208,9 @@ def test_only_one_file_calls_jit():
         PACKAGE / name for name in ("controllers", "tasks", "evolution", "simulation", "training")
     ]
     calls = {
-        path.name
+        name_of(path)
         for folder in ours
         for path in folder.rglob("*.py")
         if "jax.jit" in path.read_text(encoding="utf-8")
     }
-    assert calls <= {"stages.py", "chance.py", "starts.py"}
+    assert calls <= {"training/stages", "evolution/chance", "tasks/starts"}

@@ -70,27 +70,28 @@ def _places(shape: tuple[int, ...]) -> jax.Array:
     return jax.lax.iota(jnp.uint32, math.prod(shape)).reshape(shape)
 
 
-# Inlined in a program; outside of one, a single program instead of one per operation.
+_program = partial(jax.jit, inline=True)
+"""Inlined in a program; outside of one, a single program instead of one per operation."""
 
 
-@partial(jax.jit, inline=True)
+@_program
 def _seed(seed: jax.Array) -> jax.Array:
     return _fold_in(jnp.zeros(2, jnp.uint32), seed)
 
 
-@partial(jax.jit, static_argnums=1, inline=True)
+@partial(_program, static_argnums=1)
 def _split(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
     return _bits(key, _places((*shape, 2)), SPLIT)
 
 
-@partial(jax.jit, inline=True)
+@_program
 def _fold_in(key: jax.Array, data: jax.Array | int) -> jax.Array:
     number = jnp.uint32(data)
     # Two places per number leave none for its highest bit, so that bit goes into the key.
     return _bits(key + (number >> 31), 2 * number + _places((2,)), FOLD)
 
 
-@partial(jax.jit, static_argnums=(1, 2), inline=True)
+@partial(_program, static_argnums=(1, 2))
 def _random_bits(key: jax.Array, width: int, shape: tuple[int, ...]) -> jax.Array:
     assert width <= 32, "wider numbers are switched off in JAX"
     return _bits(key, _places(shape), DRAW).astype(f"uint{width}")

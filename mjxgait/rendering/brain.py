@@ -99,9 +99,8 @@ def _steering(reference: BrainReference, hinge: int) -> list[tuple[int, float]]:
     """Return column and weight of the light that adds to a hinge's drive; none without `steer`."""
     if reference.steer is None:
         return []
-    lights = min(reference.place.values()) - 3 * len(reference.parts)
-    first = lights + 3 * reference.hinges[hinge][0]
-    return [(first + axis, float(w)) for axis, w in enumerate(reference.steer[hinge, 0])]
+    columns, weights = reference.lit[hinge].tolist(), reference.steer[hinge, 0].tolist()
+    return list(zip(columns, weights, strict=True))
 
 
 def _cell(reference: BrainReference, number: int, depth: int, lit: bool) -> Cell:

@@ -73,38 +73,18 @@ class _Spread:
     moment: tuple[int, int]
 
 
-@pytree
-class _Drawn:
-    """Random part of `Starts`. stiff, damped: [R, J], heavy: [R, nbody - 1] in [-1, 1)."""
-
-    qpos: jax.Array
-    qvel: jax.Array
-    friction: jax.Array
-    push: jax.Array
-    push_step: jax.Array
-    stiff: jax.Array
-    damped: jax.Array
-    heavy: jax.Array
-
-
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
     """Draw R initial conditions; the same key gives the same ones.
 
     Perturbations are uniform within the half widths of the config.
     """
-    drawn = _drawn(key, _spread(creature, config), config.starts, creature.model.nbody - 1)
+    starts = _drawn(key, _spread(creature, config), config.starts, creature.model.nbody - 1)
     # Outside the program, which may round a product and a sum once instead of twice.
-    gains = np.full((config.starts, 1), config.gains, np.float32)
-    gains[0] = 0.0
-    return Starts(
-        qpos=drawn.qpos,
-        qvel=drawn.qvel,
-        friction=drawn.friction,
-        push=drawn.push,
-        push_step=drawn.push_step,
-        stiffness=_factors(gains, drawn.stiff),
-        damping=_factors(gains, drawn.damped),
-        mass_scale=_mass_scale(drawn.heavy, creature, config),
+    return dataclasses.replace(
+        starts,
+        stiffness=_factors(config.gains, starts.stiffness),
+        damping=_factors(config.gains, starts.damping),
+        mass_scale=_mass_scale(starts.mass_scale, creature, config),
         ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
         delay=_delay(jax.random.fold_in(key, 6), config),
     )
@@ -126,7 +106,8 @@ def _spread(creature: Creature, config: RolloutConfig) -> _Spread:
 
 
 @partial(jax.jit, static_argnums=(2, 3))
-def _drawn(key: jax.Array, by: _Spread, count: int, parts: int) -> _Drawn:
+def _drawn(key: jax.Array, by: _Spread, count: int, parts: int) -> Starts:
+    """Return initial conditions, their factors still as drawn, in [-1, 1)."""
     key_pos, key_vel, key_friction, key_direction, key_moment = jax.random.split(key, 5)
     key_stiffness, key_damping = jax.random.split(jax.random.fold_in(key, 1))
     perturbed = (jnp.arange(count) > 0)[:, None]
@@ -141,21 +122,28 @@ def _drawn(key: jax.Array, by: _Spread, count: int, parts: int) -> _Drawn:
     moment = jax.random.randint(key_moment, (count,), *by.moment)
     standing = jnp.tile(by.standing, (count, 1))
     still = jnp.zeros((count, by.level.shape[1]))
-    return _Drawn(
+    return Starts(
         qpos=standing.at[:, by.qpos].add(perturbed * by.angle * spread(key_pos)),
         qvel=still.at[:, by.dofs].set(perturbed * by.rate * spread(key_vel)),
         friction=jnp.where(perturbed[:, 0], friction, 1.0),
         push=by.speed * direction @ by.level,
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),
-        stiff=spread(key_stiffness),
-        damped=spread(key_damping),
-        heavy=spread(jax.random.fold_in(key, 3), parts),
+        stiffness=spread(key_stiffness),
+        damping=spread(key_damping),
+        mass_scale=spread(jax.random.fold_in(key, 3), parts),
     )
 
 
-def _factors(size: np.ndarray, spread: jax.Array) -> jax.Array:
-    """Return 1 plus this share of the spread."""
-    return 1 + jnp.asarray(size) * spread
+def half_widths(size: float, count: int) -> jax.Array:
+    """Return the half width [R, 1] of a perturbation in each trial: 0 in the first."""
+    sizes = np.full((count, 1), size, np.float32)
+    sizes[0] = 0.0
+    return jnp.asarray(sizes)
+
+
+def _factors(size: float, spread: jax.Array) -> jax.Array:
+    """Return factors [R, n] from numbers in [-1, 1)."""
+    return 1 + half_widths(size, len(spread)) * spread
 
 
 def milder(starts: Starts, share: jax.Array) -> Starts:
@@ -186,14 +174,14 @@ def _delay(key: jax.Array, config: RolloutConfig) -> jax.Array | None:
     return jax.random.randint(key, (config.starts,), 0, config.latency + 1).at[0].set(0)
 
 
-def _mass_scale(spread: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:
-    if not config.masses:
+def _mass_scale(
+    spread: jax.Array | None, creature: Creature, config: RolloutConfig
+) -> jax.Array | None:
+    if spread is None or not config.masses:
         return None
-    size = np.full((config.starts, 1), config.masses, np.float32)
-    size[0] = 0.0
     # Bodies welded to a part share its mass scale.
     carrier = np.maximum(creature.model.body_weldid[1:] - 1, 0)
-    return _factors(size, spread[:, carrier])
+    return _factors(config.masses, spread[:, carrier])
 
 
 def draw_grounds(key: jax.Array, creature: Creature, config: RolloutConfig) -> Ground | None:

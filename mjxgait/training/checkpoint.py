@@ -136,7 +136,7 @@ def _check_shapes(found: Mapping[str, Shaped], wanted: Mapping[str, Shaped], whe
 
 
 def first_difference(one: Mapping[str, object], other: Mapping[str, object]) -> str | None:
-    """Return the first name, in alphabetical order, whose values differ; None if none do."""
+    """Return the first name, in alphabetical order, with different values; None without any."""
     names = sorted(one.keys() | other.keys())
     return next((name for name in names if one.get(name) != other.get(name)), None)
 

@@ -83,7 +83,7 @@ class Brain:
 
     drive: [n] index of the value that drives a link's hinge. gain: [n] its factor. pull: [n] N·m,
     largest torque (signed). sign: [n] factor from angles to those of the genes. image: [n], -1 in a
-    mirror image. lit: [n] index of the link whose light steers a link's hinge, and steer: [n, 2, 3]
+    mirror image. lit: [n] index of the link that observes the light for a hinge. steer: [n, 2, 3]
     as in `Nerves`; None without.
     """
 

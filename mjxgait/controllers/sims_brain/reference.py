@@ -15,6 +15,8 @@ from mjxgait.creature import Creature
 from mjxgait.reference.controllers import Command, Memory
 
 CENTRE = -1
+LIGHT = (4, 5, 6)
+"""Numbers of a part's three sensors of light; see `BrainReference._sensor`."""
 TICKS = 2
 MOST, LOUDEST = 10.0, 100.0
 Neuron = tuple[int, int]
@@ -90,7 +92,8 @@ class BrainReference:
     genome: its arrays by name. parts: grown from it. hinges: part and hinge index of each joint of
     the model. step: s of the simulation. every: steps per command.
     A wire leads from a column to a neuron or a hinge. The columns: nothing, the constant 1, the
-    angles of all hinges, contact and light of all parts, the values of all neurons.
+    angles of all hinges, contact and light of all parts, the values of all neurons. lit: [J, 3]
+    columns of the light that steers each hinge. steer: see `Nerves`; None without.
     """
 
     command: ClassVar[Command] = "torque"
@@ -123,7 +126,10 @@ class BrainReference:
         self.driver = np.array([column for column, _, _ in pulls])
         self.gain = np.array([gain for _, gain, _ in pulls])
         self.strength = np.array([strength for _, _, strength in pulls])
-        self.steer = self._steer(genome.get("nerves.steer"))
+        lights = [[self._sensor(part, axis) for axis in LIGHT] for part, _ in self.hinges]
+        self.lit = np.array([[column for column, _ in three] for three in lights], int)
+        flips = np.array([[flip for _, flip in three] for three in lights])
+        self.steer = self._steer(flips)
 
     def init(self, count: int) -> Memory:
         """See `ReferenceController`."""
@@ -143,8 +149,8 @@ class BrainReference:
                 after[:, these], kept_after[:, these] = fire(kind, three, kept[:, these], dt)
             values, kept = after, kept_after
         wanted = self.gain * np.concatenate([sensed, values], axis=1)[:, self.driver]
-        if self.steer is not None and "light" in senses:
-            light = senses["light"][:, [part for part, _ in self.hinges]]
+        if self.steer is not None:
+            light = sensed[:, self.lit]
             wanted = wanted * (1 + (light * self.steer[:, 1]).sum(2))
             wanted = wanted + (light * self.steer[:, 0]).sum(2)
         torque = self.strength * np.clip(wanted, -1.0, 1.0)
@@ -210,12 +216,12 @@ class BrainReference:
         weight = sign * float(self.genome["nerves.effect_weight"][own.node, hinge])
         return column, weight, own.strength * _sign(own, hinge)
 
-    def _steer(self, genes: np.ndarray | None) -> np.ndarray | None:
-        """Return the weights [J, 2, 3] of the light; a mirror image observes a mirrored light."""
+    def _steer(self, flips: np.ndarray) -> np.ndarray | None:
+        """Return the weights [J, 2, 3] of the light, if the genome has any. flips: [J, 3] signs."""
+        genes = self.genome.get("nerves.steer")
         if genes is None:
             return None
         own = [genes[self.parts[part].node, hinge] for part, hinge in self.hinges]
-        flips = [(1.0, -1.0 if self.parts[part].mirrored else 1.0, 1.0) for part, _ in self.hinges]
         return np.reshape(own, (-1, 2, 3)) * np.reshape(flips, (-1, 1, 3))
 
 

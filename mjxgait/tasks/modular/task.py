@@ -31,7 +31,7 @@ from mjxgait.tasks.modular.config import (
     SwimWeights,
 )
 from mjxgait.tasks.plain import PlainTask
-from mjxgait.tasks.starts import NEVER, Starts
+from mjxgait.tasks.starts import NEVER, Starts, half_widths
 from mjxgait.types import Sensed, pytree
 
 WILD = 1
@@ -69,9 +69,8 @@ class BlocksTask(PlainTask):
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """The root is at the origin; growing the body puts it on the ground."""
         count, joints = settings.starts, len(self.creature.joints.names)
-        noise = np.full((count, 1), settings.joint_noise, np.float32)
-        noise[0] = 0.0
-        bent = noise * jax.random.uniform(key, (count, joints), minval=-1.0)
+        drawn = jax.random.uniform(key, (count, joints), minval=-1.0)
+        bent = half_widths(settings.joint_noise, count) * drawn
         root = np.zeros((count, 7), np.float32)
         root[:, 3] = 1.0
         still = jnp.asarray(np.zeros((count, self.creature.nv), np.float32))
