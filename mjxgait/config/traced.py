@@ -77,10 +77,10 @@ def _traced(config: Any) -> Any:
 def _leaf(value: Any, hint: Any) -> object:
     if isinstance(value, tuple):
         return tuple(np.float32(end) for end in value)
-    if isinstance(value, str):
-        options = get_args(hint)
-        return Choice(np.int32(options.index(value)), options)
     plain = get_args(hint)[0] if hasattr(hint, "__metadata__") else hint
+    if isinstance(value, str):
+        options = get_args(plain)
+        return Choice(np.int32(options.index(value)), options)
     return {bool: np.bool_, int: np.int32}.get(plain, np.float32)(value)
 
 

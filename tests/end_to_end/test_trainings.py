@@ -199,5 +199,6 @@ def test_a_changed_body_or_simulator_ends_with_a_certificate(name: str, tmp_path
 def test_a_body_that_the_light_steers_ends_with_a_certificate(tmp_path: Path, capsys):
     """Its genomes hold weights that those of other runs lack."""
     follow = Way("blocks", task="follow")
-    train(capsys, tmp_path / "run", *follow.arguments, "--controller.steer")
+    steered = ("--controller.steer", "--controller.evolves", "steering")
+    train(capsys, tmp_path / "run", *follow.arguments, *steered)
     assert "nerves.steer" in open_champion(tmp_path / "run")[1].genome

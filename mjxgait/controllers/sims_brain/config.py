@@ -1,7 +1,7 @@
 """Settings of creatures with evolving bodies and brains."""
 
 import dataclasses
-from typing import Annotated
+from typing import Annotated, Literal
 
 import pydantic
 
@@ -38,7 +38,8 @@ class BrainConfig:
         of values that change and, up to 1, the chances `connect` and `grow`.
       crossover: share of two-parent offspring with crossed nodes.
       grafting: share with a graft of the second parent; the others have one parent.
-      drawn: whether bodies stay as first drawn and only brains evolve.
+      evolves: what offspring may inherit changed. "brain": bodies stay as first drawn. "steering":
+        only the weights of `steer` change.
       steer: whether the light's direction also acts on each hinge directly, past the neurons; ours,
         not Sims'.
     """
@@ -58,5 +59,9 @@ class BrainConfig:
     strength: tuple[Positive, Positive] = (1.0, 1.0)
     crossover: Fraction = 0.3
     grafting: Fraction = 0.3
-    drawn: bool = False
+    evolves: Annotated[Literal["all", "brain", "steering"], ADDED] = "all"
     steer: Annotated[bool, SHAPE, ADDED] = False
+
+    def __post_init__(self) -> None:
+        if self.evolves == "steering" and not self.steer:
+            raise ValueError('evolves = "steering" needs steer = true')

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.config.traced import Choice, chosen
 from mjxgait.controllers.base import Command, Senses
 from mjxgait.controllers.sims_brain.brain import Brain, Mind, Perceived, blank, thought, wired
 from mjxgait.controllers.sims_brain.config import BrainConfig
@@ -18,6 +19,7 @@ from mjxgait.controllers.sims_brain.phenotype import body_of
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.creature.body import Body
 from mjxgait.evolution.variation import Variation
+from mjxgait.types import Tree
 
 LIGHT = "light"
 
@@ -71,18 +73,13 @@ class Brains:
                 crossed,
                 grafted,
             )
-            return embodied(child, mother)
+            return kept(child, mother)
 
         def mutate(key: jax.Array, genotype: Genotype) -> Genotype:
-            return embodied(kin.mutate(key, genotype), genotype)
+            return kept(kin.mutate(key, genotype), genotype)
 
-        def embodied(child: Genotype, mother: Genotype) -> Genotype:
-            graph = jax.tree.map(
-                lambda own, of_mother: jnp.where(settings.drawn, of_mother, own),
-                child.graph,
-                mother.graph,
-            )
-            return dataclasses.replace(child, graph=graph)
+        def kept(child: Genotype, mother: Genotype) -> Genotype:
+            return _restricted(settings.evolves, child, mother)
 
         return Variation(create, cross, mutate)
 
@@ -121,3 +118,19 @@ class Brains:
         perceived = Perceived(angles, senses["contact"], light)
         torque, memory = thought(plan, memory, perceived, self.pause)
         return torque[1:], memory
+
+
+def _restricted(evolves: str | Choice, child: Genotype, mother: Genotype) -> Genotype:
+    """Return the child with the mother's genes wherever they may not evolve."""
+
+    def of_mother(fixed: jax.Array, own: Tree, other: Tree) -> Tree:
+        return jax.tree.map(lambda a, b: jnp.where(fixed, b, a), own, other)
+
+    steering_only = chosen(evolves, "steering")
+    fixed = steering_only | chosen(evolves, "brain")
+    nerves = of_mother(steering_only, child.nerves, mother.nerves)
+    return Genotype(
+        of_mother(fixed, child.graph, mother.graph),
+        dataclasses.replace(nerves, steer=child.nerves.steer),
+        of_mother(steering_only, child.centre, mother.centre),
+    )

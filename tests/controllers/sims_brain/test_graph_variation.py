@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Callable
 from functools import cache
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -207,13 +208,20 @@ def test_mutation_adds_and_removes_nodes_and_connections(parents: tuple[Genotype
 
 
 FREE = pytest.mark.thorough("other tests here have bodies that vary")
+PARTS = {
+    "all": {"graph", "nerves", "centre", "steer"},
+    "brain": {"nerves", "centre", "steer"},
+    "steering": {"steer"},
+}
 
 
-@pytest.mark.parametrize("drawn", [True, pytest.param(False, marks=FREE)])
-def test_a_child_keeps_its_mothers_drawn_body(parents: tuple[Genotype, Genotype], drawn: bool):
-    """Under any operator; the brain still varies."""
+@pytest.mark.parametrize("evolves", ["brain", "steering", pytest.param("all", marks=FREE)])
+def test_only_what_may_evolve_differs_from_the_mother(
+    parents: tuple[Genotype, Genotype], evolves: Literal["all", "brain", "steering"]
+):
+    """Under any operator."""
     controller = Brains(0.01, BrainConfig(steer=True))
-    bred = controller.variation(BrainConfig(drawn=drawn), EvolutionConfig())
+    bred = controller.variation(BrainConfig(steer=True, evolves=evolves), EvolutionConfig())
     keys = jax.random.split(key_of(3), 200)
     few = [jax.tree.map(lambda leaf: leaf[:200], parent) for parent in parents]
 
@@ -222,12 +230,24 @@ def test_a_child_keeps_its_mothers_drawn_body(parents: tuple[Genotype, Genotype]
     def child(key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
         return bred.mutate(key, bred.cross(key, mother, father))
 
-    def changed(part: str) -> float:
-        """Share of children in which this part differs from the mother's."""
-        leaves = [jax.tree.leaves(getattr(each, part)) for each in (young, few[0])]
-        pairs = [(np.asarray(a), np.asarray(b)) for a, b in zip(*leaves, strict=True)]
-        return np.mean([any((a[i] != b[i]).any() for a, b in pairs) for i in range(200)])
+    young, old = _parts(child(keys, *few)), _parts(few[0])
+    changed = {name: _differing(young[name], old[name]) for name in PARTS["all"]}
+    assert {name for name, share in changed.items() if share > 0} == PARTS[evolves]
+    assert all(changed[name] > 0.5 for name in PARTS[evolves]), changed
 
-    young = child(keys, *few)
-    assert changed("graph") == 0 if drawn else changed("graph") > 0.9
-    assert changed("nerves") > 0.9
+
+def _parts(genome: Genotype) -> dict[str, object]:
+    steer = genome.nerves.steer
+    nerves = dataclasses.replace(genome.nerves, steer=None)
+    return {"graph": genome.graph, "nerves": nerves, "centre": genome.centre, "steer": steer}
+
+
+def _differing(young: object, old: object) -> float:
+    """Share of rows in which one of the leaves differs."""
+    pairs = zip(*([np.asarray(x) for x in jax.tree.leaves(t)] for t in (young, old)), strict=True)
+    return float(np.mean(np.any([(a != b).reshape(len(a), -1).any(1) for a, b in pairs], axis=0)))
+
+
+def test_steering_cannot_evolve_without_its_weights():
+    with pytest.raises(ValueError, match="needs steer"):
+        BrainConfig(evolves="steering")
