@@ -12,6 +12,9 @@ from mjxgait.certification.config import CertificateConfig, PartsConfig, Physics
 from mjxgait.reference.measure import Recording, stride_starts
 from mjxgait.reference.outcome import Fall
 
+SHAPELESS = 0.25
+"""Largest share of the mass in moving parts without a shape, such as the crosses of hips."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Measure:
@@ -153,9 +156,16 @@ def physics(window: Recording, config: PhysicsConfig) -> Criterion:
 
 
 def parts(window: Recording, config: PartsConfig) -> Criterion:
-    """Criterion 9: no more overlap than in the standing pose, except between neighbours."""
+    """Criterion 9: no more overlap than in the standing pose, except between neighbours.
+
+    Parts without a shape cannot be examined.
+    """
     deepest = window.overlap.max(initial=0.0) / window.dimensions.hip_height
-    return Criterion(9, "parts", (at_most("overlap / hip height", deepest, config.overlap),))
+    measures = [at_most("overlap / hip height", deepest, config.overlap)]
+    if window.dimensions.shapeless > 0:
+        share = window.dimensions.shapeless
+        measures.append(at_most("not examined: mass without a shape / mass", share, SHAPELESS))
+    return Criterion(9, "parts", tuple(measures))
 
 
 def joint_overrun(window: Recording) -> np.ndarray:

@@ -14,6 +14,7 @@ from mjxgait.errors import UserError
 from mjxgait.importer.anatomy import in_plane
 from mjxgait.importer.balance import steady_balance
 from mjxgait.importer.body import KinematicModel
+from mjxgait.importer.bones import add_bones
 from mjxgait.importer.clean import clean_mjcf, clean_urdf
 from mjxgait.importer.find import find_anatomy
 from mjxgait.importer.notes import Notes, listed, one_line, plain_names, tell_dropped, tell_left_out
@@ -112,6 +113,8 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     else:
         model, changes = compile_here(*parts)
     for what, why in changes:
+        for key, file in source.files.items():
+            what = what.replace(f"({key})", f'"{file}"')
         notes.change(what, why)
     tell_dropped(model, notes)
     up = source.up.value if source.up else choices.up
@@ -121,6 +124,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     tell_left_out(model, anatomy.bodies, notes)
     place_bodies(model, anatomy)
     joints = add_joints(model, anatomy, source.efforts, notes)
+    add_bones(anatomy.spec, notes)
     feet = [anatomy.bodies.index(b) for b in anatomy.feet]
     kinematics = KinematicModel(anatomy.spec, feet, *joints, in_plane(model, anatomy.root))
     start = first_pose(kinematics, model, anatomy)

@@ -15,6 +15,7 @@ import mujoco
 
 from mjxgait.errors import UserError
 from mjxgait.files import read_bytes
+from mjxgait.importer.meshes import FOREIGN
 from mjxgait.importer.notes import Guess, Notes
 
 MOST_XML = 4_000_000
@@ -34,6 +35,7 @@ class Source:
     """Cleaned model file for MuJoCo: its tree refers to meshes by keys in `assets`, to no file.
 
     efforts: N·m, largest torque by joint name, if stated outside MuJoCo's elements.
+    files: path of each mesh in `assets`, as the model states it.
     coupled: joints that follow others.
     poses: standing poses that the file offers outside keyframes.
     missing: keys of unavailable meshes, each with its expected file; MJCF only.
@@ -42,6 +44,7 @@ class Source:
 
     tree: ET.Element
     assets: dict[str, bytes] = dataclasses.field(default_factory=dict)
+    files: dict[str, str] = dataclasses.field(default_factory=dict)
     efforts: dict[str, float] = dataclasses.field(default_factory=dict)
     coupled: list[str] = dataclasses.field(default_factory=list)
     poses: list[list[float]] = dataclasses.field(default_factory=list)
@@ -129,10 +132,11 @@ def load_mesh(
 ) -> str | None:
     """Load a mesh and return its key in `source.assets`; None with a note if it is unusable."""
     suffix = Path(reference).suffix.lower()
-    if suffix not in READABLE_MESHES:
+    if suffix not in READABLE_MESHES + FOREIGN:
+        known = ", ".join(READABLE_MESHES + FOREIGN)
         notes.change(
             f'mesh "{reference}" dropped',
-            f'MuJoCo cannot read "{suffix or "no suffix"}" (it reads STL, OBJ and MSH)',
+            f'cannot read "{suffix or "no suffix"}"; save it as one of {known}',
         )
         return None
     path = places.find(reference, folders)
@@ -151,10 +155,11 @@ def load_mesh(
     except OSError as error:
         notes.change(f'mesh "{reference}" dropped', f"cannot be read ({error.strerror})")
         return None
-    key = next(
-        (k for k, v in source.assets.items() if v == data), f"asset{len(source.assets)}{suffix}"
-    )
+    kind = suffix if suffix in READABLE_MESHES else f"{suffix}.obj"  # see `meshes.convert`
+    new = f"asset{len(source.assets)}{kind}"
+    key = next((k for k, v in source.assets.items() if v == data), new)
     source.assets[key] = data
+    source.files.setdefault(key, reference)
     return key
 
 

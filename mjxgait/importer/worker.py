@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.errors import UserError
+from mjxgait.importer.meshes import convert
 from mjxgait.importer.source import leave_out
 from mjxgait.processes import python_command, safe_environment
 
@@ -30,7 +31,7 @@ MOST_REPAIRS = 40
 OPTIONAL = ("actuator", "sensor", "keyframe", "tendon", "contact")
 """Sections that are dropped if the model does not compile with them."""
 UNKNOWN_ATTRIBUTE = re.compile(r"unrecognized attribute: '([^']+)'.*?Element '([^']+)'", re.DOTALL)
-ASSET = re.compile(r"(asset[0-9]+)(?=\.(?:stl|obj|msh)|')")
+ASSET = re.compile(r"(asset[0-9]+)(?=\.(?:stl|obj|msh|dae|glb|ply)|')")
 IMPOSSIBLE = (
     "inertia must satisfy",
     "mass and inertia of moving bodies",
@@ -91,7 +92,8 @@ def compile_here(
     Raises:
       UserError: with MuJoCo's own words.
     """
-    repairs = _Repairs(tree, dict(missing or {}))
+    repairs, assets = _Repairs(tree, dict(missing or {})), dict(assets)
+    convert(assets, repairs.leave_out)
     for _ in range(MOST_REPAIRS):
         try:
             spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=assets)
@@ -128,7 +130,7 @@ class _Repairs:
     missing: dict[str, str]
     changes: list[tuple[str, str]] = dataclasses.field(default_factory=list)
     edits: list[Callable[[mujoco.MjSpec], None]] = dataclasses.field(default_factory=list)
-    left_out: list[str] = dataclasses.field(default_factory=lambda: list(OPTIONAL))
+    optional: list[str] = dataclasses.field(default_factory=lambda: list(OPTIONAL))
 
     def repair(self, message: str, assets: Collection[str]) -> bool:
         """Add a repair that avoids this message; return False if nothing is left to try."""
@@ -142,10 +144,8 @@ class _Repairs:
             what = "masses and inertias raised to 1e-4 kg and 1e-6 kg m² and balanced"
             self.changes.append((f"{what} where they were less", reason))
             return True
-        key = self._damaged(message, assets)
-        if key:
-            self.missing[key] = ""
-            self.changes.append((f"a mesh and its shapes dropped ({key})", reason))
+        if key := self._damaged(message, assets):
+            self.leave_out(key, reason)
             return True
         inertia = any(word in message for word in ("volume", "orientation", "inertia"))
         if "mesh" in message and inertia and _take_hulls not in self.edits:
@@ -153,6 +153,11 @@ class _Repairs:
             self.changes.append(("mesh inertias taken from the convex hulls", reason))
             return True
         return self._drop_section(reason)
+
+    def leave_out(self, key: str, reason: str) -> None:
+        """Leave out a mesh that cannot be read, with its shapes."""
+        self.missing[key] = ""
+        self.changes.append((f"a mesh and its shapes dropped ({key})", reason))
 
     def _drop_attribute(self, name: str, tag: str) -> bool:
         hit = [e for e in self.tree.iter(tag) if name in e.attrib]
@@ -169,8 +174,8 @@ class _Repairs:
         return "".join(key for key in keys if key not in self.missing)
 
     def _drop_section(self, reason: str) -> bool:
-        while self.left_out:
-            section = self.left_out.pop(0)
+        while self.optional:
+            section = self.optional.pop(0)
             parts = self.tree.findall(section)
             for part in parts:
                 self.tree.remove(part)

@@ -29,6 +29,7 @@ class Dimensions:
     crawler: whether parts other than feet may touch the floor.
     partner: joint on the other side, per joint; empty for an asymmetric body.
     stand_tilt: deg of the trunk's up axis when standing.
+    shapeless: share of the mass of moving parts without any shape.
     """
 
     stand_height: float
@@ -43,6 +44,7 @@ class Dimensions:
     crawler: bool = False
     partner: tuple[int, ...] = ()
     stand_tilt: float = 0.0
+    shapeless: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -139,7 +141,15 @@ def dimensions(creature: Creature) -> Dimensions:
         crawler=len(creature.feet.ground) > 0,
         partner=creature.mirror.partners if creature.mirror.symmetric else (),
         stand_tilt=float(np.degrees(np.arccos(min(up[2], 1.0)))),
+        shapeless=_shapeless(model),
     )
+
+
+def _shapeless(model: mujoco.MjModel) -> float:
+    """Return the share of the mass of moving parts, with what is fixed to them, without a shape."""
+    part = model.body_weldid
+    bare = ~np.isin(part, part[model.geom_bodyid])
+    return float(model.body_mass[bare].sum() / model.body_mass.sum())
 
 
 def measure(

@@ -282,6 +282,15 @@ def test_criterion_9_parts():
     assert half.margin == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize(("share", "fails"), [(0.2, set()), (0.3, {9})])
+def test_parts_without_a_shape_cannot_pass_unexamined(share: float, fails: set[int]):
+    """Nothing of them can be in another part."""
+    unseen = changed(walk(), dimensions=dataclasses.replace(DOG, shapeless=share))
+    assert failures(unseen) == fails
+    _, of_shapes = criteria.parts(unseen.window(2.0), CONFIG.parts).measures
+    assert (of_shapes.value, of_shapes.passed) == (share, not fails)
+
+
 def test_a_diverged_walk_fails_every_criterion_measured_on_it():
     good = walk()
     broken = {

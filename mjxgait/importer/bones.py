@@ -1,0 +1,77 @@
+"""Capsules for moving parts that the file gives no shape.
+
+Without a shape a part is in no picture, has no sole, and stands in nothing.
+"""
+
+import itertools
+import math
+
+import mujoco
+import numpy as np
+
+from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.shapes import HIDDEN, Bar, bar, mark
+
+LEAST_SHARE = 0.01
+"""Share of the body's mass below which a part may have no shape."""
+SHORT = 1e-3
+"""m, largest distance of joints at one place."""
+DENSITY = 1000.0
+"""kg/m³ of a capsule."""
+
+
+def add_bones(spec: mujoco.MjSpec, notes: Notes) -> None:
+    """Add a capsule, which is only drawn, along the bone of each moving part without any shape.
+
+    A bone leads from joint to joint, or through the centre of mass where no joint follows. A part
+    whose joints are all at one place, such as the cross of a hip, has none.
+    """
+    bodies = spec.bodies[1:]
+    least = LEAST_SHARE * sum(body.mass for body in bodies)
+    moving = [body for body in bodies if body.joints and _mass(body) >= least]
+    bare = [body for body in moving if not any(map(_has_shape, _rigid(body)))]
+    bones = {body.name: bone for body in bare if (bone := _bone(body))}
+    for body in bare:
+        if body.name in bones:
+            mark(bones[body.name].added(body), solid=False, seen=True)
+    if bones:
+        notes.change(
+            f"capsules for {listed(list(bones))}",
+            "the file has no shape for them that can be read; each lies along its bone and has its "
+            "part's weight",
+        )
+
+
+def _rigid(body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
+    """Return a moving body and the bodies fixed to it."""
+    fixed = [child for child in body.bodies if not child.joints]
+    return [body, *itertools.chain.from_iterable(map(_rigid, fixed))]
+
+
+def _mass(body: mujoco.MjsBody) -> float:
+    return float(sum(part.mass for part in _rigid(body)))
+
+
+def _has_shape(body: mujoco.MjsBody) -> bool:
+    return any(geom.conaffinity or geom.group < HIDDEN for geom in body.geoms)
+
+
+def _bone(body: mujoco.MjsBody) -> Bar | None:
+    """Return the capsule of a part; of the trunk between the joints that are farthest apart."""
+    ends = [child.pos + child.joints[0].pos for child in body.bodies if child.joints]
+    start = body.joints[0].pos
+    pairs = [(start, end) for end in ends or [2 * body.ipos - start]]
+    if body.joints[0].type == mujoco.mjtJoint.mjJNT_FREE:
+        pairs = list(itertools.combinations(ends, 2)) or [(body.ipos, body.ipos)]
+    a, b = max(pairs, key=lambda two: float(np.linalg.norm(two[1] - two[0])))
+    length = float(np.linalg.norm(b - a))
+    if ends and length < SHORT:
+        return None
+    return bar(0, a, b, _radius(_mass(body), length), seen=True)
+
+
+def _radius(mass: float, length: float) -> float:
+    """Radius in m of a capsule of this mass in kg, between ends this far apart in m."""
+    volume = mass / DENSITY
+    roots = np.roots([4 / 3 * math.pi, math.pi * length, 0.0, -volume])
+    return float(max(root.real for root in roots if abs(root.imag) < 1e-9))

@@ -1,0 +1,126 @@
+"""Meshes that MuJoCo cannot read, and parts without any shape."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from importer.models import BIPED
+from trimesh.exchange.dae import export_collada
+
+from mjxgait.cli.import_ import write_folder
+from mjxgait.creature import Creature, load_creature
+from mjxgait.errors import UserError
+from mjxgait.importer import ImportChoices, Imported, import_model, stance
+from mjxgait.importer.meshes import convert, converted
+from mjxgait.reference.measure import dimensions
+
+BLOCK = trimesh.creation.box(
+    (0.06, 0.08, 0.2), trimesh.transformations.translation_matrix((0, 0, -0.12))
+)
+MILLIMETRES = b'<asset><unit name="millimeter" meter="0.001"/>'
+
+
+@pytest.fixture(autouse=True)
+def a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stance, "FIRST", 60)
+    monkeypatch.setattr(stance, "ROUNDS", 4)
+
+
+def written(kind: str, mesh: trimesh.Trimesh = BLOCK) -> bytes:
+    data = export_collada(mesh) if kind == "dae" else mesh.export(file_type=kind)
+    assert isinstance(data, bytes)
+    return data
+
+
+def bring(folder: Path, text: str) -> tuple[Creature, Imported]:
+    file = folder / "robot.urdf"
+    file.write_text(text, encoding="utf-8")
+    imported = import_model(file, ImportChoices(apart=False))
+    write_folder(folder / "mine", imported)
+    return load_creature(folder / "mine"), imported
+
+
+def size_of(data: bytes) -> np.ndarray:
+    corners = [line.split()[1:4] for line in data.decode().splitlines() if line.startswith("v ")]
+    return np.ptp(np.array(corners, float), axis=0)
+
+
+@pytest.mark.parametrize("kind", ["dae", "ply", "glb"])
+def test_a_mesh_keeps_its_size(kind: str):
+    np.testing.assert_allclose(
+        size_of(converted(written(kind), f".{kind}")), BLOCK.extents, rtol=1e-5
+    )
+
+
+def test_a_mesh_has_the_unit_that_its_file_states():
+    data = written("dae").replace(b"<asset>", MILLIMETRES)
+    np.testing.assert_allclose(size_of(converted(data, ".dae")), BLOCK.extents / 1000, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("key", "data"),
+    [
+        ("asset0.dae.obj", b"<COLLADA/>"),
+        ("asset0.glb.obj", written("glb")[:200]),
+        ("asset0.ply.obj", b"ply\nformat ascii 1.0\nelement vertex 1000000000000\nend_header\n"),
+        ("asset0.dae.obj", b""),
+    ],
+)
+def test_a_damaged_mesh_is_reported(key: str, data: bytes):
+    assets, failed = {key: data, "asset1.stl": b"as it is"}, []
+    convert(assets, lambda *told: failed.append(told))
+    assert assets == {key: b"", "asset1.stl": b"as it is"}
+    assert [told[0] for told in failed] == [key]
+
+
+def test_feet_get_the_soles_of_their_collada_meshes(tmp_path: Path):
+    """The model has no other shapes."""
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    names = re.findall(r"package://biped/meshes/(\w+)\.dae", BIPED)
+    for name in names:
+        (meshes / f"{name}.dae").write_bytes(written("dae"))
+    text = re.sub(r"<collision>.*?</collision>", "", BIPED).replace("package://biped/", "")
+    creature, imported = bring(tmp_path, text)
+    for words in ("mesh and its shapes dropped", "capsules for", "sphere added"):
+        assert words not in imported.notes.text(), words
+    hulls = creature.model.geom_dataid[creature.model.geom_dataid >= 0]
+    assert len(hulls) == len(names)
+    assert imported.stands
+    assert all(len(names) > 0 for names in creature.feet.names)
+
+
+def test_a_mesh_that_cannot_be_read_is_named_as_in_the_model(tmp_path: Path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "trunk.dae").write_bytes(b"<COLLADA/>")
+    _, imported = bring(tmp_path, BIPED.replace("package://biped/", ""))
+    assert 'shapes dropped "meshes/trunk.dae"' in imported.notes.text()
+
+
+def test_parts_without_a_shape_get_capsules_along_their_bones(tmp_path: Path):
+    """A body that nobody can see is in no picture, and none of its parts stands in another."""
+    text = re.sub(r"<(visual|collision)>.*?</\1>", "", BIPED)
+    creature, imported = bring(tmp_path, text)
+    assert "capsules for" in imported.notes.text()
+    model = creature.model
+    seen = {model.body(model.geom_bodyid[g]).name for g in np.flatnonzero(model.geom_group < 3)}
+    parts = {model.body(b).name for b in model.jnt_bodyid}
+    assert parts - seen == {"left_hip", "right_hip"}, "the crosses between trunk and thighs"
+    assert 0 < dimensions(creature).shapeless < 0.1
+    assert np.flatnonzero(model.geom_conaffinity).size == model.ngeom - len(seen) + 1
+
+
+def test_a_mass_that_only_an_unreadable_mesh_tells_is_refused(tmp_path: Path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "trunk.dae").write_bytes(b"<COLLADA/>")
+    weightless = re.sub(r"<inertial>.*?</inertial>", "", BIPED, count=1)
+    text = re.sub(
+        r"<collision>.*?</collision>",
+        '<collision><geometry><mesh filename="meshes/trunk.dae"/></geometry></collision>',
+        weightless,
+        count=1,
+    )
+    with pytest.raises(UserError, match="a mass that only its mesh tells"):
+        bring(tmp_path, text)
