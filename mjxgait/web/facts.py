@@ -1,0 +1,152 @@
+"""Numbers that a page needs to simulate a champion itself, as one JSON document.
+
+`assets/simulation.js` and `assets/key_poses.js` read it. Names are those of
+docs/reference/controller.md; angles in rad, lengths in m.
+"""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mjxgait.certification import CertificateConfig
+from mjxgait.certification.acceptance import how_simulated
+from mjxgait.champion import Champion
+from mjxgait.controllers.key_poses.config import gene_names
+from mjxgait.creature import Creature
+from mjxgait.creature.geometry import support_extents
+from mjxgait.errors import UserError
+from mjxgait.reference.layout import FLOOR, start_frame
+from mjxgait.reference.stepping import examined_model
+
+Facts = dict[str, object]
+OPTIONS = ("iterations", "ls_iterations", "tolerance", "disableflags")
+"""Settings of the examiner's solver that differ from the creature's file."""
+
+
+def facts_of(creature: Creature, champion: Champion) -> Facts:
+    """Return everything but MuJoCo that decides how a champion moves in a page.
+
+    Raises:
+      UserError: a page cannot simulate this controller, ground, or body.
+    """
+    _check(creature, champion)
+    model, frame, start = examined_model(creature), creature.frame, start_frame(creature)
+    task = how_simulated(champion.task, champion.wish)
+    fall = task.fall(CertificateConfig())
+    headings = task.commanded_heading(2, 1.0)
+    watched = len(creature.feet.foot_of)
+    return {
+        "xml": creature.files["creature.xml"],
+        "options": {name: getattr(model.opt, name) for name in OPTIONS},
+        "step": float(model.opt.timestep),
+        "stand_qpos": creature.stand_qpos.tolist(),
+        "stand_height": float(frame.stand_height),
+        "trunk": creature.trunk,
+        "root_dof": creature.root_dof,
+        "axes": _lists(forward=frame.forward, left=frame.left, up=frame.up),
+        "start": _lists(place=start.place, forward=start.forward, left=start.left),
+        "joints": {"qpos": list(creature.joints.qpos), "dofs": list(creature.joints.dofs)},
+        "drive": _drive(creature, champion),
+        "turn": None if headings is None else float(headings[1]),
+        "floor": float(model.geom(FLOOR).pos[2]),
+        "feet": _feet(creature),
+        "forbidden": _parts(model, creature.feet.seen[watched:]),
+        "fall": {"min_up": fall.min_up, "height": list(fall.height), "touch": fall.touch},
+        "controller": _controller(creature, champion),
+    }
+
+
+def _check(creature: Creature, champion: Champion) -> None:
+    name = creature.name
+    if champion.controller != "poses":
+        raise UserError(
+            f'{name}: a page with physics runs key poses, not the controller "{champion.controller}"; '
+            "leave --physics out, and the page plays the recorded walk"
+        )
+    if not creature.terrain.flat:
+        raise UserError(
+            f"{name}: a page with physics has a plane floor, and this champion walks on "
+            f'"{creature.terrain.kind}"; leave --physics out'
+        )
+    root = creature.model.body_jntadr[creature.trunk]
+    if creature.model.jnt_type[root] != mujoco.mjtJoint.mjJNT_FREE:
+        raise UserError(
+            f"{name}: a page with physics needs a trunk that moves freely; leave --physics out"
+        )
+    champion.check_finite(creature)
+
+
+def _lists(**arrays: np.ndarray) -> dict[str, list[float]]:
+    return {name: np.asarray(array, float).tolist() for name, array in arrays.items()}
+
+
+def _drive(creature: Creature, champion: Champion) -> Facts:
+    gains, drive = creature.gains, champion.drive
+    return {
+        **_lists(
+            kp=drive.stiffness * gains.kp, kd=drive.damping * gains.kd, limit=gains.torque_limit
+        ),
+        "law": drive.law,
+        "constraint_forces": drive.constraint_forces,
+    }
+
+
+def _parts(model: mujoco.MjModel, geoms: Sequence[int]) -> list[Facts]:
+    """Geoms with the parameters of their support functions; see `support_extents`."""
+    extents = [support_extents(int(model.geom_type[g]), model.geom_size[g]) for g in geoms]
+    return [
+        {"geom": int(g), "radius": float(radius), **_lists(box=box, ellipsoid=ellipsoid)}
+        for g, (radius, box, ellipsoid) in zip(geoms, extents, strict=True)
+    ]
+
+
+def _feet(creature: Creature) -> Facts:
+    """Geoms by foot. seen: whether the controller observes the feet."""
+    parts = _parts(creature.model, creature.feet.stepping)
+    return {
+        "seen": creature.corrections.steps,
+        "parts": [
+            [part for part, of in zip(parts, creature.feet.geoms, strict=True) if of == foot]
+            for foot in range(len(creature.feet.names))
+        ],
+    }
+
+
+def _controller(creature: Creature, champion: Champion) -> Facts:
+    joints, weights, settings = creature.joints, creature.corrections, champion.settings
+    names, tuning = gene_names(weights.steps), champion.genome["tuning"]
+    mirror, stepping = creature.mirror, weights.stepping
+    return {
+        "poses": np.asarray(champion.genome["key_poses"], float).tolist(),
+        "mirror": {"sign": mirror.sign.tolist(), "partner": list(mirror.partners)}
+        if mirror.symmetric and settings.mirror
+        else None,
+        "tuning": dict(zip(names, map(float, tuning), strict=True)),
+        "interpolation": settings.interpolation,
+        "advance": settings.advance,
+        "steering": settings.steering,
+        "step": float(creature.model.opt.timestep),
+        "body_length": float(creature.frame.body_length),
+        "hip_height": float(creature.frame.hip_height),
+        "foot_places": creature.feet.places.tolist(),
+        # JSON has no infinity; an endless joint gets a bound that no angle reaches.
+        "joints": {
+            name: np.nan_to_num(array, posinf=1e9, neginf=-1e9).tolist()
+            for name, array in (("stand", joints.stand), ("low", joints.low), ("high", joints.high))
+        },
+        "weights": {
+            **_lists(
+                steer_bend=weights.steer_bend,
+                steer_stride=weights.steer_stride,
+                balance_pitch=weights.balance_pitch,
+                balance_roll=weights.balance_roll,
+            ),
+            "stepping": None
+            if stepping is None
+            else {
+                **_lists(ahead=stepping.ahead, aside=stepping.aside, turn=stepping.turn),
+                "legs": list(stepping.legs),
+            },
+        },
+    }
