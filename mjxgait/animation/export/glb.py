@@ -27,7 +27,7 @@ from mjxgait.animation.export.skeleton import (
     travel,
     world_poses,
 )
-from mjxgait.animation.export.surface import Piece, along_limbs, linear, pieces_of
+from mjxgait.animation.export.surface import Piece, Surface, along_limbs, linear, pieces_of
 from mjxgait.champion.serializers import serializer_of
 from mjxgait.files import write_bytes, writing
 
@@ -154,7 +154,7 @@ def _add_joints(
 def _add_mesh(document: gltf.GLTF2, buffer: Buffer, pieces: Sequence[Piece]) -> None:
     """One primitive and material per piece."""
     primitives = [_primitive(buffer, piece, i) for i, piece in enumerate(pieces)]
-    document.materials += [_material(piece.name, piece.colour) for piece in pieces]
+    document.materials += [material_of(piece.name, piece.colour) for piece in pieces]
     document.meshes.append(gltf.Mesh(name="body", primitives=primitives))
 
 
@@ -163,13 +163,20 @@ def _primitive(buffer: Buffer, piece: Piece, material: int) -> gltf.Primitive:
     places = np.zeros((count, 4), np.uint16 if joints.max() > 255 else np.uint8)
     places[:, 0] = joints
     weights = np.tile(np.array([255, 0, 0, 0], np.uint8), (count, 1))
-    indices = piece.faces.astype(np.uint16 if count < 0xFFFF else np.uint32)
+    primitive = shaped(buffer, (piece.points, piece.normals, piece.faces), material)
+    primitive.attributes.JOINTS_0 = buffer.add(places, gltf.ARRAY_BUFFER)
+    primitive.attributes.WEIGHTS_0 = buffer.add(weights, gltf.ARRAY_BUFFER, normalized=True)
+    return primitive
+
+
+def shaped(buffer: Buffer, surface: Surface, material: int) -> gltf.Primitive:
+    """Store a surface. material: its number in the document."""
+    points, normals, faces = surface
+    indices = faces.astype(np.uint16 if len(points) < 0xFFFF else np.uint32)
     return gltf.Primitive(
         attributes=gltf.Attributes(
-            POSITION=buffer.add(piece.points.astype(np.float32), gltf.ARRAY_BUFFER, bounds=True),
-            NORMAL=buffer.add(_unit(piece.normals), gltf.ARRAY_BUFFER),
-            JOINTS_0=buffer.add(places, gltf.ARRAY_BUFFER),
-            WEIGHTS_0=buffer.add(weights, gltf.ARRAY_BUFFER, normalized=True),
+            POSITION=buffer.add(points.astype(np.float32), gltf.ARRAY_BUFFER, bounds=True),
+            NORMAL=buffer.add(_unit(normals), gltf.ARRAY_BUFFER),
         ),
         indices=buffer.add(indices.reshape(-1), gltf.ELEMENT_ARRAY_BUFFER),
         material=material,
@@ -180,7 +187,8 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)
 
 
-def _material(name: str, colour: np.ndarray) -> gltf.Material:
+def material_of(name: str, colour: np.ndarray) -> gltf.Material:
+    """Return a matt material. colour: sRGB and opacity, [4]."""
     look = gltf.PbrMetallicRoughness(
         baseColorFactor=[*map(float, linear(colour[:3])), float(colour[3])],
         metallicFactor=0.0,

@@ -1,0 +1,112 @@
+// What the page with physics draws: MuJoCo's bodies in the viewer, what a visitor points at, the string.
+//
+// Points and directions that go in and out are MuJoCo's, in m. `scene` is what the viewer draws with.
+
+const NEAR = [[0, 0], ...Array.from({ length: 8 }, (_, i) => [Math.cos(i * Math.PI / 4), Math.sin(i * Math.PI / 4)])];
+
+export class View {
+  // facts: `page` of mjxgait/web/physics.py.
+  constructor(viewer, overlay, facts) {
+    Object.assign(this, { viewer, overlay, facts });
+    this.scene = viewer[Object.getOwnPropertySymbols(viewer).find(symbol => symbol.description === "scene")];
+    const found = name => this.scene.getObjectByName(name);
+    [this.ground, this.world, this.floor] = ["ground", "world", "floor"].map(found);
+    this.bodies = facts.bodies.map(body => [body, found(`body_${body}`)]);
+    this.camera = this.scene.getCamera();
+    this.Vector = this.camera.position.constructor;
+    this.offset = null;
+    this.setShadow();
+  }
+
+  // A shadow of the creature alone: the floor's tiles cast none, and it does not fade with their extent.
+  setShadow() {
+    const { scene, facts, floor, camera } = this, { shadow } = scene, reach = facts.extent;
+    floor.traverse(part => part.layers.set(1));
+    camera.layers.enable(1);
+    scene.boundingBox.min.set(-reach, 0, -reach);
+    scene.boundingBox.max.set(reach, reach, reach);
+    scene.boundingBox.getSize(scene.size);
+    shadow.setScene(scene, scene.shadowSoftness, "bottom");
+    this.ground.add(shadow);
+  }
+
+  // Draw the present state. follow: whether the camera goes along. seconds: since the last drawing.
+  draw(simulation, follow, seconds) {
+    const { data, model } = simulation, { trunk } = simulation.facts;
+    const place = this.vector(data.xpos[3 * trunk], data.xpos[3 * trunk + 1], 0);
+    this.offset ??= place.clone();
+    if (follow) this.offset.lerp(place, 1 - Math.exp(-seconds / 0.15));
+    for (const [body, node] of this.bodies) {
+      node.position.fromArray(data.xpos, 3 * body);
+      const [w, x, y, z] = data.xquat.slice(4 * body, 4 * body + 4);
+      node.quaternion.set(x, y, z, w);
+    }
+    const axes = this.world.quaternion, here = place.applyQuaternion(axes);
+    this.world.position.copy(this.offset).applyQuaternion(axes).negate();
+    // The floor's pattern stays where it is in the world; its patch goes along with the creature.
+    const tile = value => this.facts.apart * Math.round(value / this.facts.apart);
+    this.floor.position.set(tile(here.x), 0, tile(here.z)).add(this.world.position);
+    const down = this.vector(...model.opt.gravity).applyQuaternion(axes).normalize();
+    this.ground.quaternion.setFromUnitVectors(down, this.vector(0, -1, 0));
+    const { shadow } = this.scene, beside = here.add(this.world.position);
+    shadow.position.set(beside.x, 0, beside.z);
+    shadow.needsUpdate = true;
+    this.scene.queueRender();
+  }
+
+  // Look at the creature again at once, as after a restart.
+  recentre() {
+    this.offset = null;
+  }
+
+  vector(x, y, z) {
+    return new this.Vector(x, y, z);
+  }
+
+  // The ray from the camera through a place on the screen: its origin and unit direction, [3] each.
+  ray(clientX, clientY) {
+    const box = this.viewer.getBoundingClientRect();
+    const screen = [2 * (clientX - box.left) / box.width - 1, 1 - 2 * (clientY - box.top) / box.height];
+    const end = this.world.worldToLocal(this.vector(...screen, 0.5).unproject(this.camera));
+    const eye = this.world.worldToLocal(this.camera.getWorldPosition(this.vector(0, 0, 0)));
+    return { origin: eye.toArray(), direction: end.sub(eye).normalize().toArray() };
+  }
+
+  // What is at a place on the screen, or at most `reach` pixels beside it: body, point and distance.
+  pick(simulation, clientX, clientY, reach) {
+    const { mujoco, model, data } = simulation, geom = new mujoco.IntBuffer(1);
+    try {
+      for (const [x, y] of NEAR) {
+        const { origin, direction } = this.ray(clientX + reach * x, clientY + reach * y);
+        const far = mujoco.mj_ray(model, data, origin, direction, null, false, -1, geom, null);
+        if (far < 0) continue;
+        const body = model.geom_bodyid[geom.GetView()[0]];
+        return { body, point: origin.map((value, i) => value + far * direction[i]), far };
+      }
+    } finally {
+      geom.delete();
+    }
+    return null;
+  }
+
+  // The point under a place on the screen that is as far from the camera as asked.
+  at(clientX, clientY, far) {
+    const { origin, direction } = this.ray(clientX, clientY);
+    return origin.map((value, i) => value + far * direction[i]);
+  }
+
+  // Pixels [2] of a point, from the viewer's upper left corner.
+  pixel(point) {
+    const seen = this.world.localToWorld(this.vector(...point)).project(this.camera);
+    return [(seen.x + 1) / 2 * this.viewer.clientWidth, (1 - seen.y) / 2 * this.viewer.clientHeight];
+  }
+
+  // Draw a line between two points, or none. Its class is its look.
+  line(name, ends) {
+    const line = this.overlay.querySelector(`line.${name}`);
+    line.style.visibility = ends ? "visible" : "hidden";
+    if (!ends) return;
+    const [[x1, y1], [x2, y2]] = ends.map(end => this.pixel(end));
+    for (const [key, value] of Object.entries({ x1, y1, x2, y2 })) line.setAttribute(key, value);
+  }
+}

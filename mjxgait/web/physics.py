@@ -1,0 +1,101 @@
+"""One HTML file in which MuJoCo's WebAssembly build simulates a champion, without any network."""
+
+import base64
+import gzip
+import html
+import json
+import string
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from mjxgait.animation.export.bodies import build_bodies, shown_bodies
+from mjxgait.certification import CertificateConfig
+from mjxgait.creature import Creature
+from mjxgait.rendering.walk import doubt, record_walk
+from mjxgait.training.folder import open_champion
+from mjxgait.web.facts import Facts, facts_of
+from mjxgait.web.page import save_page, viewer_script
+from mjxgait.web.wasm import PACKAGE, VERSION, Engine, engine_from
+
+SECONDS = 5.0
+"""s of the champion's walk that are simulated for the notice on its certificate."""
+CLASSES = {"key_poses.js": "KeyPoses", "simulation.js": "Simulation", "view.js": "View"}
+"""Modules that the page's own script, `physics.js`, uses, and the class of each."""
+FAR, FARTHEST = 2.4, 3.0
+"""Camera distance in units of the creature's size, and the largest in units of that."""
+PUSH = 2.0
+"""Size of a visitor's push over that of the certificate."""
+EXPORT = "export default loadMujoco;"
+"""Last line of the engine's script, which an inline script needs otherwise."""
+
+
+def write_physics_page(run: Path, out: Path, wasm: Path | None = None) -> str:
+    """Write the page of a run's champion; return the notice of `doubt`.
+
+    wasm: folder of MuJoCo's WebAssembly build; see `engine_from`.
+
+    Raises:
+      UserError: no run, no champion, one that a page cannot simulate, no WebAssembly build, or the
+        file cannot be written.
+    """
+    creature, champion = open_champion(run)
+    facts = facts_of(creature, champion)
+    said = doubt(run, record_walk(creature, champion, SECONDS))
+    save_page(out, build_physics_page(creature, facts, engine_from(wasm), said))
+    return said
+
+
+def build_physics_page(
+    creature: Creature, facts: Facts, engine: Engine, said: str
+) -> str:
+    """Return the text of the page. said: the notice of `doubt`; empty if it is certified."""
+    web = resources.files("mjxgait.web") / "assets"
+    extent = float(creature.model.stat.extent)
+    glb, apart = build_bodies(creature)
+    speed = CertificateConfig().pushes.speed * PUSH
+    page = {
+        "bodies": shown_bodies(creature),
+        "apart": apart,
+        "extent": extent,
+        "push": speed * (creature.gravity * creature.frame.hip_height) ** 0.5,
+    }
+    lead = (
+        "This is physics, not animation: MuJoCo runs in this page, and the evolved controller moves "
+        f"the joints. {said or 'The undisturbed walk is certified'}."
+    )
+    contents = (
+        f"MuJoCo {VERSION} (npm package {PACKAGE}, Google DeepMind) and model-viewer (Google), both "
+        "under the Apache License 2.0; the creature and its controller, by mjxgait. The page asks "
+        "for no other file and no network."
+    )
+    script = engine.script.replace(EXPORT, "globalThis.loadMujoco = loadMujoco;")
+    return string.Template((web / "physics.html").read_text(encoding="utf-8")).substitute(
+        title=html.escape(creature.name.replace("_", " ")),
+        lead=html.escape(lead),
+        contents=html.escape(contents),
+        licence=html.escape((web / "model-viewer.LICENSE").read_text(encoding="utf-8")),
+        glb=base64.b64encode(glb).decode("ascii"),
+        target=f"0m {0.6 * creature.frame.stand_pos[2]:.3f}m 0m",
+        far=f"{FAR * extent:.3f}m",
+        farthest=f"{FARTHEST * FAR * extent:.3f}m",
+        facts=_json(facts),
+        page=_json(page),
+        # The same bytes on every day and machine.
+        binary=base64.b64encode(gzip.compress(engine.binary, 9, mtime=0)).decode("ascii"),
+        viewer=viewer_script(),
+        engine=script.replace("</script", "<\\/script"),
+        modules="\n".join(_module(web / name, kind) for name, kind in CLASSES.items()),
+        code=(web / "physics.js").read_text(encoding="utf-8"),
+    )
+
+
+def _module(file: Traversable, kind: str) -> str:
+    """Script element with a module, whose class other scripts find under its name."""
+    text = file.read_text(encoding="utf-8")
+    return f'<script type="module">\n{text}\nglobalThis.{kind} = {kind};\n</script>'
+
+
+def _json(value: object) -> str:
+    """JSON that cannot end the script element that holds it."""
+    return json.dumps(value).replace("<", "\\u003c")
