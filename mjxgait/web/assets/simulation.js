@@ -201,7 +201,7 @@ export class Simulation {
     const away = minus(point, three(data.xpos, body));
     const mass = model.body_mass.reduce((sum, value) => sum + value, 0), firmness = 8;
     this.pull = { body, target: [...point], stiffness: mass * firmness ** 2, damping: mass * firmness,
-                  most: 3 * mass * Math.hypot(...this.plain.gravity),
+                  most: 2 * mass * Math.hypot(...this.plain.gravity),
                   local: [0, 1, 2].map(column => rot[column] * away[0] + rot[3 + column] * away[1] + rot[6 + column] * away[2]) };
   }
 

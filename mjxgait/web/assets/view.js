@@ -15,13 +15,17 @@ export class View {
     this.camera = this.scene.getCamera();
     this.Vector = this.camera.position.constructor;
     this.offset = null;
-    this.setShadow();
+    this.setFloor();
   }
 
-  // A shadow of the creature alone: the floor's tiles cast none, and it does not fade with their extent.
-  setShadow() {
+  // Only the creature casts a shadow, which does not fade with the extent of the floor's tiles.
+  setFloor() {
     const { scene, facts, floor, camera } = this, { shadow } = scene, reach = facts.extent;
-    floor.traverse(part => part.layers.set(1));
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+    floor.traverse(part => {
+      part.layers.set(1);
+      if (dark) part.material?.color.setScalar(0.12);
+    });
     camera.layers.enable(1);
     scene.boundingBox.min.set(-reach, 0, -reach);
     scene.boundingBox.max.set(reach, reach, reach);
