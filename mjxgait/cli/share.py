@@ -39,7 +39,9 @@ def share_command(arguments: Sequence[str]) -> int:
             f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
         )
     if options.wasm and not options.physics:
-        raise UserError("--wasm names what --physics puts into the page; add --physics, or leave it out")
+        raise UserError(
+            "--wasm names what --physics puts into the page; add --physics, or leave it out"
+        )
     from mjxgait.training.stored import require_writable
 
     require_writable(options.out)

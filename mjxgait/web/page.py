@@ -3,7 +3,6 @@
 import base64
 import html
 import json
-import math
 import string
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
@@ -12,30 +11,18 @@ from pathlib import Path
 
 from mjxgait import files
 from mjxgait.animation.export import WalkLoop, build_driven, build_glb, viewpoint, walk_loop
-from mjxgait.certification import (
-    Verdict,
-    criteria_of,
-    outdated,
-    read_certificate,
-    read_stress,
-    verdict_of,
-)
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.rendering.curves import Figures, draw_fitness, figure
 from mjxgait.rendering.gaitplots import gait_figures
 from mjxgait.rendering.video import LOOP_SECONDS
 from mjxgait.rendering.walk import Walk, doubt, record_walk
-from mjxgait.training.folder import CERTIFICATE, METRICS, STRESS, open_champion, read_metrics
+from mjxgait.training.folder import METRICS, open_champion, read_metrics
+from mjxgait.web.certificate import certificate_summary, certificate_table, table
 
 RATE = 30
 FARTHEST = 3.0
 """Largest distance to which a reader can move the camera, in units of the first."""
-CHECK = (
-    "This page proves nothing by itself. Whoever has the run folder can have the champion examined "
-    "again: <code>mjxgait inspect RUN --verify</code> compares every measure with the certificate "
-    "and ends with exit code 0 only if all are equal."
-)
 FAR = 1.7
 """Camera distance in units of the creature's size, or farther where a loop needs more room."""
 
@@ -48,7 +35,9 @@ def write_page(run: Path, out: Path) -> str:
     """
     creature, champion = open_champion(run)
     walk = record_walk(creature, champion, LOOP_SECONDS)
-    page = build_page(walk, walk_loop(walk, RATE), _sections(run, creature, champion, walk))
+    verdict = certificate_summary(run, creature, champion)
+    sections = _sections(run, creature, champion, walk)
+    page = build_page(walk, walk_loop(walk, RATE), verdict, sections)
     save_page(out, page)
     return doubt(run, walk)
 
@@ -63,6 +52,11 @@ def save_page(out: Path, page: str) -> None:
         files.write_text(out, page)
 
 
+def style() -> str:
+    """Return the rules that pages have in common."""
+    return (resources.files("mjxgait.web") / "assets" / "style.css").read_text(encoding="utf-8")
+
+
 def viewer_script() -> str:
     """Return the viewer's script, ready to be embedded in a page."""
     script = resources.files("mjxgait.web") / "assets" / "model-viewer.min.js"
@@ -71,8 +65,8 @@ def viewer_script() -> str:
     return text.replace("</script", "<\\/script")
 
 
-def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
-    """Return the text of the page. sections: HTML below the walk."""
+def build_page(walk: Walk, loop: WalkLoop, verdict: str, sections: str) -> str:
+    """Return the text of the page. verdict, sections: HTML above and below the walk."""
     web = resources.files("mjxgait.web") / "assets"
     target, far = viewpoint(loop, FAR)
     stride = loop.times[-1] / loop.strides
@@ -83,7 +77,10 @@ def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
     )
     return string.Template((web / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(walk.creature.name.replace("_", " ")),
+        style=style(),
         lead=html.escape(lead),
+        verdict=verdict,
+        file=html.escape(f"{walk.creature.name}.glb"),
         glb=base64.b64encode(build_glb(loop, floor=True)).decode("ascii"),
         target=" ".join(f"{place:.3f}m" for place in target),
         far=f"{far:.3f}m",
@@ -120,52 +117,6 @@ def _images(figures: Figures, creature: Creature) -> Iterable[str]:
         yield f'<div class="wide"><img alt="{alt}" src="data:image/svg+xml;base64,{data}"></div>'
 
 
-def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:
-    """Return the criteria as a table, or the reason why there is none."""
-    document = read_certificate(run / CERTIFICATE)
-    if document is None:
-        return "<p>Not examined: <code>mjxgait certify</code> does it.</p>"
-    if reason := outdated(document, champion, creature):
-        return f"<p>{html.escape(reason)} <code>mjxgait certify</code> examines this one.</p>"
-    rows = [
-        [
-            f"{c.number} {c.name}",
-            m.name,
-            _show(m.value),
-            f"{m.sense} {m.threshold:g}",
-            "pass" if m.passed else "fails",
-        ]
-        for c in criteria_of(document)
-        for m in c.measures
-    ]
-    table = _table(("criterion", "measure", "value", "wanted", "verdict"), rows)
-    said = html.escape(_said(verdict_of(document)))
-    return f"<p>{said}</p>{table}{_anywhere(run, champion)}<p>{CHECK}</p>"
-
-
-def _said(verdict: Verdict) -> str:
-    """Verdict in one or two sentences."""
-    said = "All criteria pass" if verdict.passed else "Not all criteria pass"
-    if verdict.reservation:
-        return f"Not certified. {said}, but {verdict.reservation}."
-    return f"{said}."
-
-
-def _anywhere(run: Path, champion: Champion) -> str:
-    """Table of the stress tests; empty if the champion has not taken them."""
-    document = read_stress(run / STRESS, champion)
-    if document is None:
-        return ""
-    verdict = "It walks anywhere." if document["passed"] else "It does not walk anywhere."
-    if document["reservation"]:
-        verdict = f"It is not known to walk anywhere: {html.escape(document['reservation'])}."
-    rows = [
-        [t["name"], f"{t['share']:.0%}", "pass" if t["passed"] else "fails"]
-        for t in document["trials"]
-    ]
-    return f"<p>{verdict}</p>" + _table(("stress test", "of the starts", "verdict"), rows)
-
-
 def _origin(creature: Creature, champion: Champion) -> str:
     origin = champion.origin
     rows = [
@@ -183,35 +134,7 @@ def _origin(creature: Creature, champion: Champion) -> str:
             or "unknown",
         ],
     ]
-    return _table((), rows)
-
-
-def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    def cell(text: str) -> str:
-        # Numbers align only in a table with a heading.
-        kind = (
-            ' class="fails"'
-            if text == "fails"
-            else ' class="number"'
-            if heading and _is_number(text)
-            else ""
-        )
-        return f"<td{kind}>{html.escape(text)}</td>"
-
-    head = f"<tr>{''.join(f'<th>{html.escape(h)}</th>' for h in heading)}</tr>" if heading else ""
-    body = "".join("<tr>" + "".join(map(cell, row)) + "</tr>" for row in rows)
-    return f'<div class="wide"><table>{head}{body}</table></div>'
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-def _show(value: float) -> str:
-    return "none" if math.isnan(value) else f"{value:.3g}"
+    return table((), rows)
 
 
 DRIVE_FAR = 3.2

@@ -15,7 +15,7 @@ from mjxgait.creature import Creature
 from mjxgait.rendering.walk import doubt, record_walk
 from mjxgait.training.folder import open_champion
 from mjxgait.web.facts import Facts, facts_of
-from mjxgait.web.page import save_page, viewer_script
+from mjxgait.web.page import save_page, style, viewer_script
 from mjxgait.web.wasm import PACKAGE, VERSION, Engine, engine_from
 
 SECONDS = 5.0
@@ -46,9 +46,7 @@ def write_physics_page(run: Path, out: Path, wasm: Path | None = None) -> str:
     return said
 
 
-def build_physics_page(
-    creature: Creature, facts: Facts, engine: Engine, said: str
-) -> str:
+def build_physics_page(creature: Creature, facts: Facts, engine: Engine, said: str = "") -> str:
     """Return the text of the page. said: the notice of `doubt`; empty if it is certified."""
     web = resources.files("mjxgait.web") / "assets"
     extent = float(creature.model.stat.extent)
@@ -72,6 +70,7 @@ def build_physics_page(
     script = engine.script.replace(EXPORT, "globalThis.loadMujoco = loadMujoco;")
     return string.Template((web / "physics.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(creature.name.replace("_", " ")),
+        style=style(),
         lead=html.escape(lead),
         contents=html.escape(contents),
         licence=html.escape((web / "model-viewer.LICENSE").read_text(encoding="utf-8")),

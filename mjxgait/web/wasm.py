@@ -4,6 +4,7 @@ It is the npm package `@mujoco/mujoco` (Apache-2.0), of one version with known c
 part of this package: npm fetches it once into the user's cache, or the user names its folder.
 """
 
+import contextlib
 import dataclasses
 import hashlib
 import os
@@ -11,6 +12,7 @@ import shutil
 import subprocess
 import tarfile
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from mjxgait import files
@@ -27,9 +29,7 @@ MOST = 100_000_000
 """Largest size of a file in bytes."""
 PATIENCE = 300.0
 """s; npm waits for the network."""
-BY_HAND = (
-    f"fetch the npm package {PACKAGE} {VERSION} elsewhere, unpack it, and name its folder with --wasm"
-)
+BY_HAND = f"fetch the npm package {PACKAGE} {VERSION} elsewhere, unpack it, and name its folder with --wasm"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,11 +47,11 @@ def engine_from(folder: Path | None) -> Engine:
       UserError: the folder holds another build, or npm is missing or cannot fetch it.
     """
     if folder is not None:
-        return _checked(folder)
+        return _read(folder)
     kept = cache_folder()
     if not all((kept / name).is_file() for name in CHECKSUMS):
         _fetch(kept)
-    return _checked(kept)
+    return _read(kept)
 
 
 def cache_folder() -> Path:
@@ -60,15 +60,21 @@ def cache_folder() -> Path:
     return Path(cache) / "mjxgait" / f"mujoco-wasm-{VERSION}"
 
 
-def _checked(folder: Path) -> Engine:
+def _read(folder: Path) -> Engine:
+    """Return the build in a folder."""
     found = {name: files.read_bytes(folder / name, MOST) for name in CHECKSUMS}
+    _check(found, folder)
+    return Engine(found["mujoco.js"].decode("utf-8"), found["mujoco.wasm"])
+
+
+def _check(found: Mapping[str, bytes], folder: Path) -> None:
+    """Refuse another build. found: contents by name."""
     for name, data in found.items():
         if hashlib.sha256(data).hexdigest() != CHECKSUMS[name]:
             raise UserError(
                 f"{folder / name}: not the file of {PACKAGE} {VERSION}; take it away, or name the "
                 "unpacked package with --wasm"
             )
-    return Engine(found["mujoco.js"].decode("utf-8"), found["mujoco.wasm"])
 
 
 def _fetch(kept: Path) -> None:
@@ -81,8 +87,10 @@ def _fetch(kept: Path) -> None:
         )
     with tempfile.TemporaryDirectory() as work, files.writing(kept):
         _pack(npm, work)
+        found = _unpacked(next(Path(work).glob("*.tgz")))
+        _check(found, kept)
         kept.mkdir(parents=True, exist_ok=True)
-        for name, data in _unpacked(next(Path(work).glob("*.tgz"))).items():
+        for name, data in found.items():
             files.write_bytes(kept / name, data)
 
 
@@ -111,10 +119,10 @@ def _pack(npm: str, work: str) -> None:
 
 
 def _unpacked(archive: Path) -> dict[str, bytes]:
-    """Content of the two files by name; nothing is written."""
-    with tarfile.open(archive) as packed:
-        found = {}
-        for name in CHECKSUMS:
-            member = packed.extractfile(f"package/{name}")
-            found[name] = member.read(MOST) if member else b""
-        return found
+    """Content of the two files by name; nothing is written. What is missing is empty."""
+    found = dict.fromkeys(CHECKSUMS, b"")
+    with contextlib.suppress(tarfile.TarError, KeyError, EOFError), tarfile.open(archive) as packed:
+        for name in found:
+            if member := packed.extractfile(f"package/{name}"):
+                found[name] = member.read(MOST)
+    return found

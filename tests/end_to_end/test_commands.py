@@ -10,6 +10,7 @@ from animation.keys.made import columns, swings
 from end_to_end.shipped import CONFIGS, CREATURES, ROOT
 from end_to_end.walks import short_examination, small_settings, trained, walker
 from helpers import STOOL, said_by
+from web.engine import engine_folder
 
 from mjxgait.certification import read_certificate
 from mjxgait.cli import COMMANDS
@@ -45,6 +46,11 @@ def examined(folder: Path) -> tuple[list[str], str]:
     return given, f"run/{CERTIFICATE}"
 
 
+def simulated(folder: Path) -> tuple[list[str], str]:
+    given = [str(walker(folder / "run")), "--physics", "--wasm", str(engine_folder())]
+    return [*given, "--out", "live.html"], "live.html"
+
+
 def gathered(folder: Path) -> tuple[list[str], str]:
     given = ["--env", str(STOOL), "--speeds", "0.3", "--turns", "10"]
     given += ["--config", small_settings(folder), "--generations", "1", "--out", "set"]
@@ -62,7 +68,7 @@ FORMS: dict[str, list[Made]] = {
         for kind in ("png", "webp")
     ],
     "export": [of_run("--out", f"walk.{kind}", writes=f"walk.{kind}") for kind in ("glb", "bvh")],
-    "share": [of_run("--out", "walk.html", writes="walk.html")],
+    "share": [of_run("--out", "walk.html", writes="walk.html"), simulated],
     "repertoire": [gathered],
     "import": [
         lambda folder: ([str(STOOL / "creature.xml"), "--out", "mine"], "mine/creature.toml")

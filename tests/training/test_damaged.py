@@ -36,8 +36,8 @@ from mjxgait.training.folder import (
     read_metrics,
 )
 from mjxgait.training.stored import FOLDER, stored_generations
+from mjxgait.web.certificate import certificate_table
 from mjxgait.web.live import Watcher
-from mjxgait.web.page import certificate_table
 
 DEEP: Any = []
 for _ in range(200):

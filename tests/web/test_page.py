@@ -12,13 +12,13 @@ from helpers import made_up_certificate
 from rendering.made_up import treading, write_run
 from web.browser import canvas, drawn, is_blank, watched_tab
 
-from mjxgait.certification import CertificateConfig
+from mjxgait.certification import Certificate, CertificateConfig, Criterion, Measure
 from mjxgait.certification.stress import Stress, StressConfig, Trial
 from mjxgait.cli import main
 from mjxgait.config.tables import build
 from mjxgait.errors import UserError
 from mjxgait.training.folder import CERTIFICATE, STRESS
-from mjxgait.web.page import certificate_table
+from mjxgait.web.certificate import certificate_summary, certificate_table
 
 CERTIFIED = made_up_certificate("") | {
     "passed": False,
@@ -100,6 +100,31 @@ def test_a_moment_can_be_chosen_and_stepped(opened):
     assert tab.evaluate("walk.currentTime") == pytest.approx(4 * frame)
 
 
+def test_keys_pause_and_step(opened):
+    tab, _, _ = opened
+    tab.evaluate("time.value = 5; time.dispatchEvent(new Event('input')); document.body.focus()")
+    orbit = tab.evaluate("walk.getCameraOrbit().theta")
+    tab.click("text=half")
+    tab.keyboard.press("ArrowRight")
+    tab.keyboard.press("ArrowRight")
+    tab.keyboard.press("ArrowLeft")
+    assert tab.evaluate("time.value") == "6"
+    assert tab.evaluate("walk.getCameraOrbit().theta") == orbit
+    tab.keyboard.press(" ")
+    assert not tab.evaluate("walk.paused")
+    tab.keyboard.press(" ")
+    assert tab.evaluate("walk.paused")
+
+
+def test_the_animation_can_be_saved(opened):
+    tab, _, _ = opened
+    with tab.expect_download() as started:
+        tab.click("text=save the GLB")
+    assert started.value.suggested_filename == "stool.glb"
+    with open(started.value.path(), "rb") as file:
+        assert file.read(4) == b"glTF"
+
+
 def test_the_camera_has_preset_views(opened):
     tab, _, _ = opened
     for place, turned in (("side", -90), ("front", 0)):
@@ -165,6 +190,28 @@ def test_only_a_certificate_of_this_champion_is_shown(stool, tmp_path):
     (run / CERTIFICATE).write_text("[]")
     with pytest.raises(UserError, match="not a certificate"):
         certificate_table(run, stool, champion)
+
+
+def test_the_verdict_and_the_tightest_measures_come_first(stool, tmp_path):
+    champion = treading(stool)
+    run = write_run(tmp_path / "run", stool, champion)
+    assert certificate_summary(run, stool, champion) == ""
+    (run / CERTIFICATE).write_text(json.dumps(CERTIFIED))
+    assert certificate_summary(run, stool, champion) == ""
+    (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
+    short = certificate_summary(run, stool, champion)
+    assert "Not all criteria pass." in short
+    assert "slip &lt;or&gt; slide none (&lt;= 0.15)" in short
+    names = [(3, "third"), (1, "first"), (4, "fourth"), (9, "last"), (2, "second")]
+    measures = tuple(Measure(name, 1.0 + place, ">=", 1.0, 10.0) for place, name in names)
+    told, settings = {"ground": "flat", "summary": ""}, CertificateConfig()
+    criteria = (Criterion(7, "gait", measures),)
+    made = Certificate("stool", "", "walk", champion.fingerprint, criteria, told, settings, 1.0)
+    (run / CERTIFICATE).write_text(json.dumps(made.document()))
+    short = certificate_summary(run, stool, champion)
+    assert "<b>All criteria pass.</b> Margin 0.10." in short
+    assert re.search(r"Tightest: first 2 .*; second 3 .*; third 4 ", short)
+    assert "fourth" not in short
 
 
 def test_stress_results_are_shown_beside_the_certificate(stool, tmp_path):

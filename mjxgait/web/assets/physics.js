@@ -23,7 +23,7 @@ async function start() {
   const mujoco = await loadMujoco({ wasmBinary: await unpacked("engine") });
   const simulation = new Simulation(mujoco, facts, new KeyPoses(facts.controller));
   const view = new View(viewer, element("overlay"), page);
-  const state = { paused: false, slow: 1, follow: true, pulled: null, lying: 0, shove: null };
+  const state = { paused: false, slow: 1, follow: true, pulled: null, lying: 0, shove: null, changed: true };
   const parts = { simulation, view, state, page };
   connectButtons(parts);
   connectSliders(parts);
@@ -52,7 +52,9 @@ function run({ simulation, view, state, page }) {
       state.lying = simulation.isDown() && !state.pulled ? state.lying + step : 0;
     }
     const computing = performance.now() - began;
-    view.draw(simulation, state.follow, passed);
+    // A paused page costs nothing.
+    if (!state.paused || state.changed) view.draw(simulation, state.follow, passed);
+    state.changed = false;
     drawLines(simulation, view, state);
     shown = [...shown, { moment, time: simulation.time, steps, computing, place: ahead(simulation) }]
       .filter(one => moment - one.moment < 1000 && one.time <= simulation.time);
@@ -81,19 +83,23 @@ function drawLines(simulation, view, state) {
   view.line("shove", state.shove && [tip.map((value, i) => value - (shove.way[i] ?? 0)), tip]);
 }
 
+// Text without "-0.0".
+const rounded = (value, digits) => value.toFixed(digits).replace(/^-(?=0\.0*$)/, "");
+
 function tell(simulation, state, shown, page) {
   const { time } = simulation, first = shown[0], last = shown.at(-1), lies = state.lying > LYING;
   const passed = last.time - first.time, real = (last.moment - first.moment) / 1000;
   const speed = passed > 0.2 ? (last.place - first.place) / passed : 0;
   const sum = key => shown.reduce((total, one) => total + one[key], 0);
   const late = !state.paused && real > 0.8 && passed / real < 0.9 * state.slow;
-  now.textContent = `${time.toFixed(1)} s, ${last.place.toFixed(1)} m, ${speed.toFixed(2)} m/s`
+  now.textContent = `${rounded(time, 1)} s, ${rounded(last.place, 1)} m, ${rounded(speed, 2)} m/s`
     + (late ? `; this machine manages ${Math.round(100 * passed / real)} % of real time` : "");
   if (lies !== said.classList.contains("fell")) {
     said.classList.toggle("fell", lies);
     said.innerHTML = lies ? 'It fell. <button data-do="restart">Stand up again (R)</button>' : "";
   }
-  Object.assign(viewer.dataset, { time, ahead: last.place, lies, pulled: Boolean(simulation.pull),
+  Object.assign(viewer.dataset, { time, ahead: last.place, lies, paused: state.paused,
+    pulled: Boolean(simulation.pull),
     frames: real > 0 ? (shown.length - 1) / real : 0, stepped: sum("computing") / Math.max(1, sum("steps")) });
 }
 
@@ -134,6 +140,7 @@ function connectButtons(parts) {
   document.addEventListener("click", event => {
     const { do: action, push: direction } = event.target.dataset;
     if (action) actions[action](parts);
+    parts.state.changed = true;
     if (direction) push(parts, direction);
   });
   const speeds = [...document.querySelectorAll(".speed")];
@@ -144,7 +151,7 @@ function connectButtons(parts) {
     });
 }
 
-function connectSliders({ simulation }) {
+function connectSliders({ simulation, state }) {
   const value = id => Number(element(id).value), { forward, left } = simulation.facts.start;
   const slope = () => {
     const [up, aside] = ["uphill", "aside"].map(id => value(id) * Math.PI / 180);
@@ -162,6 +169,7 @@ function connectSliders({ simulation }) {
     slider.addEventListener("input", () => {
       shown.textContent = `${slider.value}${slider.dataset.unit}`;
       apply();
+      state.changed = true;
     });
   }
 }
@@ -199,6 +207,7 @@ function connectKeys(parts) {
     const slides = event.target.matches?.("input"), action = keys[event.key.toLowerCase()];
     if (event.key in ARROWS && !slides && !event.repeat) push(parts, ARROWS[event.key]);
     else if (action && !event.repeat) actions[action](parts);
+    parts.state.changed = true;
     if (action || (event.key in ARROWS && !slides)) {
       event.preventDefault();
       event.stopPropagation();

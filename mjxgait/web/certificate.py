@@ -1,0 +1,116 @@
+"""A run's certificate as HTML: the verdict in short, and all measures."""
+
+import html
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from mjxgait.certification import (
+    Verdict,
+    criteria_of,
+    outdated,
+    read_certificate,
+    read_stress,
+    verdict_of,
+)
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.training.folder import CERTIFICATE, STRESS
+
+CHECK = (
+    "This page proves nothing by itself. Whoever has the run folder can have the champion examined "
+    "again: <code>mjxgait inspect RUN --verify</code> compares every measure with the certificate "
+    "and ends with exit code 0 only if all are equal."
+)
+TIGHTEST = 3
+"""Number of measures in the summary."""
+
+
+def certificate_summary(run: Path, creature: Creature, champion: Champion) -> str:
+    """Return the verdict, the margin, and the measures with the least room, as a paragraph."""
+    document = read_certificate(run / CERTIFICATE)
+    if document is None or outdated(document, champion, creature):
+        return ""
+    verdict, measures = verdict_of(document), [m for c in criteria_of(document) for m in c.measures]
+    nearest = sorted(measures, key=lambda measure: measure.margin)[:TIGHTEST]
+    listed = "; ".join(f"{m.name} {_show(m.value)} ({m.sense} {m.threshold:g})" for m in nearest)
+    worst = f" Margin {verdict.margin:.2f}." if math.isfinite(verdict.margin) else ""
+    said = f"<b>{html.escape(_said(verdict))}</b>{worst}"
+    return f'<p class="verdict">{said} Tightest: {html.escape(listed)}.</p>'
+
+
+def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:
+    """Return the criteria as a table, or the reason why there is none."""
+    document = read_certificate(run / CERTIFICATE)
+    if document is None:
+        return "<p>Not examined: <code>mjxgait certify</code> does it.</p>"
+    if reason := outdated(document, champion, creature):
+        return f"<p>{html.escape(reason)} <code>mjxgait certify</code> examines this one.</p>"
+    rows = [
+        [
+            f"{c.number} {c.name}",
+            m.name,
+            _show(m.value),
+            f"{m.sense} {m.threshold:g}",
+            "pass" if m.passed else "fails",
+        ]
+        for c in criteria_of(document)
+        for m in c.measures
+    ]
+    measured = table(("criterion", "measure", "value", "wanted", "verdict"), rows)
+    said = html.escape(_said(verdict_of(document)))
+    folded = f"<details><summary>All measures</summary>{measured}</details>"
+    return f"<p>{said}</p>{folded}{_anywhere(run, champion)}<p>{CHECK}</p>"
+
+
+def _said(verdict: Verdict) -> str:
+    """Verdict in one or two sentences."""
+    said = "All criteria pass" if verdict.passed else "Not all criteria pass"
+    if verdict.reservation:
+        return f"Not certified. {said}, but {verdict.reservation}."
+    return f"{said}."
+
+
+def _anywhere(run: Path, champion: Champion) -> str:
+    """Table of the stress tests; empty if the champion has not taken them."""
+    document = read_stress(run / STRESS, champion)
+    if document is None:
+        return ""
+    verdict = "It walks anywhere." if document["passed"] else "It does not walk anywhere."
+    if document["reservation"]:
+        verdict = f"It is not known to walk anywhere: {html.escape(document['reservation'])}."
+    rows = [
+        [t["name"], f"{t['share']:.0%}", "pass" if t["passed"] else "fails"]
+        for t in document["trials"]
+    ]
+    return f"<p>{verdict}</p>" + table(("stress test", "of the starts", "verdict"), rows)
+
+
+def table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table. Texts are escaped; `fails` is bold."""
+
+    def cell(text: str) -> str:
+        # Numbers align only in a table with a heading.
+        kind = (
+            ' class="fails"'
+            if text == "fails"
+            else ' class="number"'
+            if heading and _is_number(text)
+            else ""
+        )
+        return f"<td{kind}>{html.escape(text)}</td>"
+
+    head = f"<tr>{''.join(f'<th>{html.escape(h)}</th>' for h in heading)}</tr>" if heading else ""
+    body = "".join("<tr>" + "".join(map(cell, row)) + "</tr>" for row in rows)
+    return f'<div class="wide"><table>{head}{body}</table></div>'
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _show(value: float) -> str:
+    return "none" if math.isnan(value) else f"{value:.3g}"

@@ -1,0 +1,161 @@
+"""`mjxgait share --physics`: one file that simulates the champion in a browser.
+
+The tests need MuJoCo's WebAssembly build (npm), Chromium (apt: chromium) and the Python package
+playwright.
+"""
+
+import dataclasses
+import json
+
+import pytest
+from helpers import said_by
+from rendering.made_up import falling, treading, write_run
+from web.browser import drawn, wait_until, watched_tab
+from web.engine import engine_folder
+
+from mjxgait.creature.ground.spec import parse_ground
+from mjxgait.errors import UserError
+from mjxgait.experiments.repertoire.grid import GRID
+from mjxgait.web.facts import facts_of
+from mjxgait.web.physics import build_physics_page
+from mjxgait.web.wasm import engine_from
+
+STARTED = "document.getElementById('walk').dataset.time > 0"
+
+
+@pytest.fixture(scope="module")
+def page(stool, tmp_path_factory):
+    """The page of a creature that treads on the spot."""
+    text = build_physics_page(stool, facts_of(stool, treading(stool)), engine_from(engine_folder()))
+    file = tmp_path_factory.mktemp("physics") / "walk.html"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module")
+def opened(browser, page):
+    """The running page, its errors and its requests."""
+    tab, wrong, asked = watched_tab(browser, page.as_uri())
+    wait_until(tab, STARTED)
+    return tab, wrong, asked
+
+
+@pytest.fixture
+def tab(opened):
+    """The page with the creature standing, and all sliders as evolved."""
+    tab, _, _ = opened
+    tab.click("text=As evolved")
+    if shown(tab)["paused"]:
+        tab.keyboard.press(" ")
+    tab.keyboard.press("r")
+    wait_until(tab, "walk.dataset.lies === 'false'")
+    return tab
+
+
+def shown(tab):
+    """State of the page, as it writes it with each picture."""
+    found = tab.evaluate("Object.assign({}, document.getElementById('walk').dataset)")
+    return {name: json.loads(value) for name, value in found.items()}
+
+
+def test_the_creature_moves_in_real_time_and_asks_for_nothing(opened):
+    tab, wrong, asked = opened
+    before = shown(tab)["time"]
+    wait_until(tab, f"walk.dataset.time > {before + 0.5}")
+    drawn(tab)
+    assert wrong == []
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+def test_space_pauses_and_r_starts_again(tab):
+    wait_until(tab, "walk.dataset.time > 0.3")
+    tab.keyboard.press(" ")
+    wait_until(tab, "walk.dataset.paused === 'true'")
+    stopped = shown(tab)["time"]
+    tab.wait_for_timeout(300)
+    assert shown(tab)["time"] == stopped
+    assert tab.inner_text("#pause") == "Go on"
+    tab.keyboard.press("r")
+    wait_until(tab, "walk.dataset.time === '0'")
+
+
+def test_it_says_that_the_creature_fell(tab):
+    for _ in range(6):
+        tab.keyboard.press("ArrowLeft")
+    wait_until(tab, "walk.dataset.lies === 'true'")
+    assert "It fell." in tab.inner_text("#said")
+    tab.click("text=Stand up again")
+    wait_until(tab, "walk.dataset.lies === 'false'")
+    assert tab.inner_text("#said") == ""
+
+
+def test_the_pointer_pulls_the_creature_but_not_the_floor(tab):
+    box = tab.locator("#walk").bounding_box()
+    seat = box["x"] + box["width"] / 2, box["y"] + 0.36 * box["height"]
+    orbit = tab.evaluate("walk.getCameraOrbit().theta")
+    tab.mouse.move(*seat)
+    tab.mouse.down()
+    tab.mouse.move(seat[0] + 40, seat[1] - 60, steps=3)
+    wait_until(tab, "walk.dataset.pulled === 'true'")
+    assert tab.evaluate("document.querySelector('line.string').style.visibility") == "visible"
+    tab.mouse.up()
+    wait_until(tab, "walk.dataset.pulled === 'false'")
+    assert tab.evaluate("walk.getCameraOrbit().theta") == pytest.approx(orbit)
+    tab.mouse.move(box["x"] + 20, box["y"] + 20)
+    tab.mouse.down()
+    tab.mouse.move(box["x"] + 120, box["y"] + 20, steps=3)
+    tab.mouse.up()
+    assert shown(tab)["pulled"] is False
+    wait_until(tab, f"Math.abs(walk.getCameraOrbit().theta - {orbit}) > 0.1")
+
+
+def test_a_slope_makes_it_slide(tab):
+    for slider, value in (("uphill", 20), ("friction", 0.05)):
+        tab.evaluate(f"{slider}.value = {value}; {slider}.dispatchEvent(new Event('input'))")
+    wait_until(tab, "walk.dataset.ahead < -0.3")
+    assert tab.inner_text('output[for="uphill"]') == "20°"
+
+
+def test_it_fits_a_phone_and_answers_a_finger(browser, page, tab):
+    # An animated page takes more than a core; a paused one takes none.
+    tab.keyboard.press(" ")
+    tab = browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    tab.goto(page.as_uri())
+    wait_until(tab, STARTED)
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+    assert "pinch" in tab.inner_text("body")
+    assert "scroll" not in tab.inner_text("body")
+    tab.tap("text=Pause")
+    wait_until(tab, "walk.dataset.paused === 'true'")
+    tab.close()
+
+
+def test_a_controller_or_ground_that_a_page_cannot_run_is_refused(stool):
+    champion = treading(stool)
+    other = dataclasses.replace(champion, controller="expressions")
+    with pytest.raises(UserError, match=r'key poses, not the controller "expressions"'):
+        facts_of(stool, other)
+    hilly = dataclasses.replace(stool, terrain=parse_ground("bumps:0.05"))
+    with pytest.raises(UserError, match="bumps"):
+        facts_of(hilly, champion)
+
+
+def test_the_command_writes_the_page_of_a_run(stool, tmp_path, capsys):
+    run, out = write_run(tmp_path / "run", stool, falling(stool)), tmp_path / "walk.html"
+    given = ("share", run, "--physics", "--out", out)
+    said = said_by(capsys, *given, "--wasm", engine_folder(), code=0)
+    assert "Not certified: it falls after" in said
+    text = out.read_text(encoding="utf-8")
+    assert "Not certified: it falls after" in text
+    assert "Apache License" in text
+    assert len(text) < 6_000_000
+    assert "no such file" in said_by(capsys, *given, "--wasm", tmp_path, code=2)
+
+
+def test_contradicting_options_are_refused(stool, tmp_path, capsys):
+    run, out = write_run(tmp_path / "run", stool, treading(stool)), tmp_path / "walk.html"
+    assert "add --physics" in said_by(capsys, "share", run, "--out", out, "--wasm", run, code=2)
+    (run / GRID).write_text("{}")
+    said = said_by(capsys, "share", run, "--out", out, "--physics", code=2)
+    assert "name one of its runs" in said
+    assert not out.exists()
