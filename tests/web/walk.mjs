@@ -26,19 +26,20 @@ function walk({ facts, steps, disturbed, push }) {
   return { qpos, target, fell: simulation.fell === Infinity ? null : simulation.fell, pulls: pulls(simulation) };
 }
 
-// A hand that holds the trunk still, after a reset: its motion in 1 s, and then without the hand.
+// A hand that lifts the trunk by 1 m, after a reset: places before, after 1.8 s, after 2 s, and 1 s later.
 function pulls(simulation) {
   const { trunk, step } = simulation.facts;
   const place = () => [...simulation.data.xpos.slice(3 * trunk, 3 * trunk + 3)];
+  const wait = seconds => {
+    for (let time = 0; time < seconds; time += step) simulation.step();
+    return place();
+  };
   simulation.reset();
   simulation.hold(trunk, place());
   simulation.pull.target[2] += 1;
-  const before = place();
-  for (let time = 0; time < 1; time += step) simulation.step();
-  const held = place();
+  const before = place(), rising = wait(1.8), held = wait(0.2);
   simulation.letGo();
-  for (let time = 0; time < 1; time += step) simulation.step();
-  return { before, held, after: place() };
+  return { before, rising, held, after: wait(1) };
 }
 
 console.log(JSON.stringify(cases.map(walk)));
