@@ -81,7 +81,7 @@ def build_physics_page(creature: Creature, facts: Facts, engine: Engine, said: s
         facts=_json(facts),
         page=_json(page),
         # The same bytes on every day and machine.
-        binary=base64.b64encode(gzip.compress(engine.binary, 9, mtime=0)).decode("ascii"),
+        binary=base64.b64encode(gzip.compress(engine.binary, 6, mtime=0)).decode("ascii"),
         viewer=viewer_script(),
         engine=script.replace("</script", "<\\/script"),
         modules="\n".join(_module(web / name, kind) for name, kind in CLASSES.items()),
