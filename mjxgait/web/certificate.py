@@ -22,8 +22,10 @@ CHECK = (
     "again: <code>mjxgait inspect RUN --verify</code> compares every measure with the certificate "
     "and ends with exit code 0 only if all are equal."
 )
+
 TIGHTEST = 3
 """Number of measures in the summary."""
+SIGNS = {">=": "≥", "<=": "≤"}
 
 
 def certificate_summary(run: Path, creature: Creature, champion: Champion) -> str:
@@ -33,7 +35,9 @@ def certificate_summary(run: Path, creature: Creature, champion: Champion) -> st
         return ""
     verdict, measures = verdict_of(document), [m for c in criteria_of(document) for m in c.measures]
     nearest = sorted(measures, key=lambda measure: measure.margin)[:TIGHTEST]
-    listed = "; ".join(f"{m.name} {_show(m.value)} ({m.sense} {m.threshold:g})" for m in nearest)
+    listed = "; ".join(
+        f"{m.name} {_show(m.value)} ({SIGNS[m.sense]} {m.threshold:g})" for m in nearest
+    )
     worst = f" Margin {verdict.margin:.2f}." if math.isfinite(verdict.margin) else ""
     said = f"<b>{html.escape(_said(verdict))}</b>{worst}"
     return f'<p class="verdict">{said} Tightest: {html.escape(listed)}.</p>'

@@ -201,7 +201,7 @@ def test_the_verdict_and_the_tightest_measures_come_first(stool, tmp_path):
     (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
     short = certificate_summary(run, stool, champion)
     assert "Not all criteria pass." in short
-    assert "slip &lt;or&gt; slide none (&lt;= 0.15)" in short
+    assert "slip &lt;or&gt; slide none (≤ 0.15)" in short
     names = [(3, "third"), (1, "first"), (4, "fourth"), (9, "last"), (2, "second")]
     measures = tuple(Measure(name, 1.0 + place, ">=", 1.0, 10.0) for place, name in names)
     told, settings = {"ground": "flat", "summary": ""}, CertificateConfig()
