@@ -44,10 +44,12 @@ def test_the_docs_list_every_fault():
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_can_be_planted(name: str):
-    """Its text occurs exactly once, the result is valid Python, and the named tests exist."""
+    """Its text occurs exactly once, the result is valid if Python, and the named tests exist."""
     fault = FAULTS[name]
     assert fault.why
-    ast.parse(script.planted(fault))
+    planted = script.planted(fault)
+    if fault.file.endswith(".py"):
+        ast.parse(planted)
     assert fault.tests
     for test in fault.tests:
         file, _, function = test.partition("::")

@@ -16,17 +16,24 @@ function walk({ facts, steps, disturbed, push }) {
     simulation.setSlope(...disturbed.slope);
     simulation.reset();
   }
-  const qpos = [], target = [];
+  const qpos = [],
+    target = [];
   for (let k = 0; k < steps; k++) {
     if (push?.step === k) simulation.push(...push.speed);
     qpos.push([...simulation.data.qpos]);
     simulation.step();
     target.push(simulation.target);
   }
-  return { qpos, target, fell: simulation.fell === Infinity ? null : simulation.fell, pulls: pulls(simulation) };
+  return {
+    qpos,
+    target,
+    fell: simulation.fell === Infinity ? null : simulation.fell,
+    pulls: pulls(simulation),
+  };
 }
 
-// A hand that lifts the trunk by 1 m, after a reset: places before, after 1.8 s, after 2 s, and 1 s later.
+// A hand that lifts the trunk by 1 m, after a reset: places before, after 1.8 s,
+// after 2 s, and 1 s later.
 function pulls(simulation) {
   const { trunk, step } = simulation.facts;
   const place = () => [...simulation.data.xpos.slice(3 * trunk, 3 * trunk + 3)];
@@ -37,7 +44,9 @@ function pulls(simulation) {
   simulation.reset();
   simulation.hold(trunk, place());
   simulation.pull.target[2] += 1;
-  const before = place(), rising = wait(1.8), held = wait(0.2);
+  const before = place(),
+    rising = wait(1.8),
+    held = wait(0.2);
   simulation.letGo();
   return { before, rising, held, after: wait(1) };
 }

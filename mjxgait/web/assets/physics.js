@@ -5,9 +5,12 @@ const { KeyPoses, Simulation, View, loadMujoco } = globalThis;
 
 const element = id => document.getElementById(id);
 const json = id => JSON.parse(element(id).textContent);
-const viewer = element("walk"), said = element("said"), now = element("now");
+const viewer = element("walk"),
+  said = element("said"),
+  now = element("now");
 // s: longest time that one picture makes up for. ms: longest computing for one picture.
-const MOST_PASSED = 0.1, MOST_COMPUTING = 30;
+const MOST_PASSED = 0.1,
+  MOST_COMPUTING = 30;
 // s that it must lie before the page says so: a creature that was lifted may land on its feet.
 const LYING = 0.4;
 const ARROWS = { ArrowUp: "ahead", ArrowDown: "back", ArrowLeft: "left", ArrowRight: "right" };
@@ -23,7 +26,15 @@ async function start() {
   const mujoco = await loadMujoco({ wasmBinary: await unpacked("engine") });
   const simulation = new Simulation(mujoco, facts, new KeyPoses(facts.controller));
   const view = new View(viewer, element("overlay"), page);
-  const state = { paused: false, slow: 1, follow: true, pulled: null, lying: 0, shove: null, changed: true };
+  const state = {
+    paused: false,
+    slow: 1,
+    follow: true,
+    pulled: null,
+    lying: 0,
+    shove: null,
+    changed: true,
+  };
   const parts = { simulation, view, state, page };
   connectButtons(parts);
   connectSliders(parts);
@@ -36,9 +47,12 @@ async function start() {
 // Real time, with an accumulator. A machine that is too slow slows the creature down, not the page.
 function run({ simulation, view, state, page }) {
   const { step } = simulation.facts;
-  let before = performance.now(), due = 0, shown = [];
+  let before = performance.now(),
+    due = 0,
+    shown = [];
   const frame = moment => {
-    const passed = Math.max(0, Math.min((moment - before) / 1000, MOST_PASSED)), began = performance.now();
+    const passed = Math.max(0, Math.min((moment - before) / 1000, MOST_PASSED)),
+      began = performance.now();
     before = moment;
     if (!state.paused) due += passed * state.slow;
     let steps = 0;
@@ -56,8 +70,10 @@ function run({ simulation, view, state, page }) {
     if (!state.paused || state.changed) view.draw(simulation, state.follow, passed);
     state.changed = false;
     drawLines(simulation, view, state);
-    shown = [...shown, { moment, time: simulation.time, steps, computing, place: ahead(simulation) }]
-      .filter(one => moment - one.moment < 1000 && one.time <= simulation.time);
+    shown = [
+      ...shown,
+      { moment, time: simulation.time, steps, computing, place: ahead(simulation) },
+    ].filter(one => moment - one.moment < 1000 && one.time <= simulation.time);
     tell(simulation, state, shown, page);
     requestAnimationFrame(frame);
   };
@@ -66,10 +82,13 @@ function run({ simulation, view, state, page }) {
 
 // m that the trunk is ahead of its start.
 function ahead({ data, facts: { trunk, start } }) {
-  return start.forward.reduce((sum, value, i) => sum + value * (data.xpos[3 * trunk + i] - start.place[i]), 0);
+  return start.forward.reduce(
+    (sum, value, i) => sum + value * (data.xpos[3 * trunk + i] - start.place[i]),
+    0,
+  );
 }
 
-// The string's end follows the pointer, as far from the camera as the creature was when it was caught.
+// The string's end follows the pointer, at the distance at which the creature was caught.
 function aim(simulation, view, { pulled }) {
   if (pulled && simulation.pull) simulation.pull.target = view.at(pulled.x, pulled.y, pulled.far);
 }
@@ -77,7 +96,9 @@ function aim(simulation, view, { pulled }) {
 function drawLines(simulation, view, state) {
   const { pull } = simulation;
   view.line("string", pull && [simulation.pulledPoint(), pull.target]);
-  const { shove } = state, { trunk } = simulation.facts, { xpos } = simulation.data;
+  const { shove } = state,
+    { trunk } = simulation.facts,
+    { xpos } = simulation.data;
   if (shove && simulation.time - shove.time > 0.4) state.shove = null;
   const tip = [...xpos.slice(3 * trunk, 3 * trunk + 3)];
   view.line("shove", state.shove && [tip.map((value, i) => value - (shove.way[i] ?? 0)), tip]);
@@ -87,20 +108,31 @@ function drawLines(simulation, view, state) {
 const rounded = (value, digits) => value.toFixed(digits).replace(/^-(?=0\.0*$)/, "");
 
 function tell(simulation, state, shown, page) {
-  const { time } = simulation, first = shown[0], last = shown.at(-1), lies = state.lying > LYING;
-  const passed = last.time - first.time, real = (last.moment - first.moment) / 1000;
+  const { time } = simulation,
+    first = shown[0],
+    last = shown.at(-1),
+    lies = state.lying > LYING;
+  const passed = last.time - first.time,
+    real = (last.moment - first.moment) / 1000;
   const speed = passed > 0.2 ? (last.place - first.place) / passed : 0;
   const sum = key => shown.reduce((total, one) => total + one[key], 0);
   const late = !state.paused && real > 0.8 && passed / real < 0.9 * state.slow;
-  now.textContent = `${rounded(time, 1)} s, ${rounded(last.place, 1)} m, ${rounded(speed, 2)} m/s`
-    + (late ? `; this machine manages ${Math.round(100 * passed / real)} % of real time` : "");
+  now.textContent =
+    `${rounded(time, 1)} s, ${rounded(last.place, 1)} m, ${rounded(speed, 2)} m/s` +
+    (late ? `; this machine manages ${Math.round((100 * passed) / real)} % of real time` : "");
   if (lies !== said.classList.contains("fell")) {
     said.classList.toggle("fell", lies);
     said.innerHTML = lies ? 'It fell. <button data-do="restart">Stand up again (R)</button>' : "";
   }
-  Object.assign(viewer.dataset, { time, ahead: last.place, lies, paused: state.paused,
+  Object.assign(viewer.dataset, {
+    time,
+    ahead: last.place,
+    lies,
+    paused: state.paused,
     pulled: Boolean(simulation.pull),
-    frames: real > 0 ? (shown.length - 1) / real : 0, stepped: sum("computing") / Math.max(1, sum("steps")) });
+    frames: real > 0 ? (shown.length - 1) / real : 0,
+    stepped: sum("computing") / Math.max(1, sum("steps")),
+  });
 }
 
 const actions = {
@@ -128,9 +160,17 @@ const actions = {
 
 // A sudden change of the trunk's velocity, as in the certificate, seen from the creature.
 function push({ simulation, state, page }, direction) {
-  const { data, facts: { trunk, axes } } = simulation, rot = data.xmat.slice(9 * trunk, 9 * trunk + 9);
-  const nose = [0, 3].map(row => rot[row] * axes.forward[0] + rot[row + 1] * axes.forward[1] + rot[row + 2] * axes.forward[2]);
-  const length = Math.max(Math.hypot(...nose), 1e-6), [x, y] = nose.map(value => value / length);
+  const {
+      data,
+      facts: { trunk, axes },
+    } = simulation,
+    rot = data.xmat.slice(9 * trunk, 9 * trunk + 9);
+  const nose = [0, 3].map(
+    row =>
+      rot[row] * axes.forward[0] + rot[row + 1] * axes.forward[1] + rot[row + 2] * axes.forward[2],
+  );
+  const length = Math.max(Math.hypot(...nose), 1e-6),
+    [x, y] = nose.map(value => value / length);
   const way = { ahead: [x, y], back: [-x, -y], left: [-y, x], right: [y, -x] }[direction];
   simulation.push(page.push * way[0], page.push * way[1]);
   state.shove = { time: simulation.time, way: way.map(value => page.extent * 0.5 * value) };
@@ -152,9 +192,10 @@ function connectButtons(parts) {
 }
 
 function connectSliders({ simulation, state }) {
-  const value = id => Number(element(id).value), { forward, left } = simulation.facts.start;
+  const value = id => Number(element(id).value),
+    { forward, left } = simulation.facts.start;
   const slope = () => {
-    const [up, aside] = ["uphill", "aside"].map(id => value(id) * Math.PI / 180);
+    const [up, aside] = ["uphill", "aside"].map(id => (value(id) * Math.PI) / 180);
     simulation.setSlope(up * forward[0] + aside * left[0], up * forward[1] + aside * left[1]);
   };
   const change = {
@@ -162,10 +203,13 @@ function connectSliders({ simulation, state }) {
     aside: slope,
     friction: () => simulation.setFriction(value("friction")),
     mass: () => simulation.setMass(value("mass")),
-    pace: () => { simulation.pace = value("pace"); },
+    pace: () => {
+      simulation.pace = value("pace");
+    },
   };
   for (const [id, apply] of Object.entries(change)) {
-    const slider = element(id), shown = document.querySelector(`output[for="${id}"]`);
+    const slider = element(id),
+      shown = document.querySelector(`output[for="${id}"]`);
     slider.addEventListener("input", () => {
       shown.textContent = `${slider.value}${slider.dataset.unit}`;
       apply();
@@ -181,20 +225,33 @@ function connectPointer({ simulation, view, state }) {
     state.pulled = null;
     simulation.letGo();
   };
-  viewer.addEventListener("pointerdown", event => {
-    if (state.pulled) event.stopPropagation();
-    if (state.pulled || event.button !== 0) return;
-    const found = view.pick(simulation, event.clientX, event.clientY, event.pointerType === "touch" ? 24 : 8);
-    if (!found) return;
-    event.stopPropagation();
-    viewer.setPointerCapture(event.pointerId);
-    state.pulled = { id: event.pointerId, x: event.clientX, y: event.clientY, far: found.far };
-    simulation.hold(found.body, found.point);
-  }, { capture: true });
+  viewer.addEventListener(
+    "pointerdown",
+    event => {
+      if (state.pulled) event.stopPropagation();
+      if (state.pulled || event.button !== 0) return;
+      const found = view.pick(
+        simulation,
+        event.clientX,
+        event.clientY,
+        event.pointerType === "touch" ? 24 : 8,
+      );
+      if (!found) return;
+      event.stopPropagation();
+      viewer.setPointerCapture(event.pointerId);
+      state.pulled = { id: event.pointerId, x: event.clientX, y: event.clientY, far: found.far };
+      simulation.hold(found.body, found.point);
+    },
+    { capture: true },
+  );
   viewer.addEventListener("pointermove", event => {
-    if (state.pulled?.id === event.pointerId) Object.assign(state.pulled, { x: event.clientX, y: event.clientY });
+    if (state.pulled?.id === event.pointerId)
+      Object.assign(state.pulled, { x: event.clientX, y: event.clientY });
     else if (!event.buttons && event.pointerType === "mouse")
-      viewer.classList.toggle("grab", Boolean(view.pick(simulation, event.clientX, event.clientY, 8)));
+      viewer.classList.toggle(
+        "grab",
+        Boolean(view.pick(simulation, event.clientX, event.clientY, 8)),
+      );
   });
   viewer.addEventListener("pointerup", end);
   viewer.addEventListener("pointercancel", end);
@@ -202,22 +259,34 @@ function connectPointer({ simulation, view, state }) {
 
 function connectKeys(parts) {
   const keys = { " ": "pause", r: "restart", f: "follow" };
-  addEventListener("keydown", event => {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const slides = event.target.matches?.("input"), action = keys[event.key.toLowerCase()];
-    if (event.key in ARROWS && !slides && !event.repeat) push(parts, ARROWS[event.key]);
-    else if (action && !event.repeat) actions[action](parts);
-    parts.state.changed = true;
-    if (action || (event.key in ARROWS && !slides)) {
-      event.preventDefault();
-      event.stopPropagation();
-    }
-  }, { capture: true });
+  addEventListener(
+    "keydown",
+    event => {
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      const slides = event.target.matches?.("input"),
+        action = keys[event.key.toLowerCase()];
+      if (event.key in ARROWS && !slides && !event.repeat) push(parts, ARROWS[event.key]);
+      else if (action && !event.repeat) actions[action](parts);
+      parts.state.changed = true;
+      if (action || (event.key in ARROWS && !slides)) {
+        event.preventDefault();
+        event.stopPropagation();
+      }
+    },
+    { capture: true },
+  );
   // Space on a button would press it as well.
-  addEventListener("keyup", event => { if (event.key === " ") event.preventDefault(); }, { capture: true });
+  addEventListener(
+    "keyup",
+    event => {
+      if (event.key === " ") event.preventDefault();
+    },
+    { capture: true },
+  );
 }
 
-const begin = () => start().catch(error => {
-  said.textContent = `This browser cannot run the physics (${error.message}).`;
-});
+const begin = () =>
+  start().catch(error => {
+    said.textContent = `This browser cannot run the physics (${error.message}).`;
+  });
 viewer.loaded ? begin() : viewer.addEventListener("load", begin, { once: true });

@@ -1,11 +1,15 @@
 // One creature in MuJoCo's WebAssembly build, under a controller, with what a visitor may change.
 //
-// It knows neither pages nor kinds of controllers. Observations, stable PD and falls are written from
-// docs/reference/controller.md and docs/reference/certificate.md. Units: m, kg, s, N, rad; the world's
-// z axis points up. Letters: J joints, F feet, nv degrees of freedom.
+// It knows neither pages nor kinds of controllers. Observations, stable PD and falls are written
+// from docs/reference/controller.md and docs/reference/certificate.md. Units: m, kg, s, N, rad; the
+// world's z axis points up. Letters: J joints, F feet, nv degrees of freedom.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1],
+  a[2] * b[0] - a[0] * b[2],
+  a[0] * b[1] - a[1] * b[0],
+];
 const minus = (a, b) => a.map((value, i) => value - b[i]);
 const clip = (value, low, high) => Math.min(high, Math.max(low, value));
 const wrapped = angle => angle - 2 * Math.PI * Math.floor((angle + Math.PI) / (2 * Math.PI));
@@ -24,11 +28,16 @@ export class Simulation {
     this.data = new mujoco.MjData(this.model);
     this.scratch = new mujoco.MjData(this.model);
     const { body_mass, body_inertia, geom_friction, opt, M_rownnz, M_colind } = this.model;
-    this.plain = { mass: [...body_mass], inertia: [...body_inertia], friction: [...geom_friction],
-                   gravity: [...opt.gravity] };
+    this.plain = {
+      mass: [...body_mass],
+      inertia: [...body_inertia],
+      friction: [...geom_friction],
+      gravity: [...opt.gravity],
+    };
     this.entries = [];
     for (const row of M_rownnz.keys())
-      for (let n = 0; n < M_rownnz[row]; n++) this.entries.push([row, M_colind[this.entries.length]]);
+      for (let n = 0; n < M_rownnz[row]; n++)
+        this.entries.push([row, M_colind[this.entries.length]]);
     this.pace = 1;
     this.turn = facts.turn;
     this.pull = null;
@@ -58,7 +67,8 @@ export class Simulation {
 
   // Factors on every body's mass and inertia, and on sliding friction.
   setMass(factor) {
-    const { body_mass, body_inertia } = this.model, { mass, inertia } = this.plain;
+    const { body_mass, body_inertia } = this.model,
+      { mass, inertia } = this.plain;
     body_mass.set(mass.map(value => factor * value));
     body_inertia.set(inertia.map(value => factor * value));
     this.mujoco.mj_setConst(this.model, this.scratch);
@@ -66,15 +76,23 @@ export class Simulation {
   }
 
   setFriction(factor) {
-    this.model.geom_friction.set(this.plain.friction.map((value, i) => i % 3 ? value : factor * value));
+    this.model.geom_friction.set(
+      this.plain.friction.map((value, i) => (i % 3 ? value : factor * value)),
+    );
     this.renew();
   }
 
   // Slope of the floor in rad along the world's x and y. Gravity tilts instead of the floor.
   setSlope(x, y) {
-    const angle = Math.hypot(x, y), { gravity } = this.plain, size = Math.hypot(...gravity);
+    const angle = Math.hypot(x, y),
+      { gravity } = this.plain,
+      size = Math.hypot(...gravity);
     const uphill = angle > 0 ? [x / angle, y / angle] : [0, 0];
-    const change = [-Math.sin(angle) * uphill[0], -Math.sin(angle) * uphill[1], 1 - Math.cos(angle)];
+    const change = [
+      -Math.sin(angle) * uphill[0],
+      -Math.sin(angle) * uphill[1],
+      1 - Math.cos(angle),
+    ];
     this.model.opt.gravity.set(gravity.map((value, i) => value + size * change[i]));
     this.renew();
   }
@@ -89,12 +107,16 @@ export class Simulation {
 
   // One control step.
   step() {
-    const { mujoco, model, data, facts } = this, senses = this.senses();
+    const { mujoco, model, data, facts } = this,
+      senses = this.senses();
     const { target, memory } = this.controller.act(this.memory, senses, this.pace);
     this.target = target;
     this.memory = memory;
-    const torque = this.torque(target), applied = data.qfrc_applied;
-    facts.joints.dofs.forEach((dof, j) => { applied[dof] = torque[j]; });
+    const torque = this.torque(target),
+      applied = data.qfrc_applied;
+    facts.joints.dofs.forEach((dof, j) => {
+      applied[dof] = torque[j];
+    });
     this.applyPull();
     mujoco.mj_step2(model, data);
     this.forces.set(data.qfrc_constraint);
@@ -106,8 +128,11 @@ export class Simulation {
 
   // Observations of the controller, by their names in the documentation.
   senses() {
-    const { data, facts } = this, { trunk, axes, start, root_dof } = facts, { qpos, qvel } = data;
-    const rot = data.xmat.slice(9 * trunk, 9 * trunk + 9), place = three(data.xpos, trunk);
+    const { data, facts } = this,
+      { trunk, axes, start, root_dof } = facts,
+      { qpos, qvel } = data;
+    const rot = data.xmat.slice(9 * trunk, 9 * trunk + 9),
+      place = three(data.xpos, trunk);
     const [forward, left] = [turned(rot, axes.forward), turned(rot, axes.left)];
     const spin = turned(rot, qvel.slice(root_dof + 3, root_dof + 6));
     const heading = Math.atan2(dot(forward, start.left), dot(forward, start.forward));
@@ -125,12 +150,16 @@ export class Simulation {
   }
 
   footSenses(forward, place, qvel) {
-    const { feet, root_dof } = this.facts, { geom_xpos } = this.data;
+    const { feet, root_dof } = this.facts,
+      { geom_xpos } = this.data;
     const length = Math.max(Math.hypot(forward[0], forward[1]), 1e-6);
-    const nose = [forward[0] / length, forward[1] / length, 0], beside = cross([0, 0, 1], nose);
+    const nose = [forward[0] / length, forward[1] / length, 0],
+      beside = cross([0, 0, 1], nose);
     const velocity = qvel.slice(root_dof, root_dof + 3);
-    const middle = geoms => [0, 1, 2].map(
-      axis => geoms.reduce((sum, { geom }) => sum + geom_xpos[3 * geom + axis], 0) / geoms.length);
+    const middle = geoms =>
+      [0, 1, 2].map(
+        axis => geoms.reduce((sum, { geom }) => sum + geom_xpos[3 * geom + axis], 0) / geoms.length,
+      );
     return {
       foot_height: feet.parts.map(geoms => Math.min(...geoms.map(one => this.height(one)))),
       foot_place: feet.parts.map(geoms => {
@@ -143,31 +172,52 @@ export class Simulation {
 
   // Height of a geom's lowest point above the floor: the sum of a sphere, a box and an ellipsoid.
   height({ geom, radius, box, ellipsoid }) {
-    const { geom_xpos, geom_xmat } = this.data, down = three(geom_xmat, 3 * geom + 2);
-    const reach = radius + dot(down.map(Math.abs), box) + Math.hypot(...down.map((d, i) => d * ellipsoid[i]));
+    const { geom_xpos, geom_xmat } = this.data,
+      down = three(geom_xmat, 3 * geom + 2);
+    const reach =
+      radius + dot(down.map(Math.abs), box) + Math.hypot(...down.map((d, i) => d * ellipsoid[i]));
     return geom_xpos[3 * geom + 2] - reach - this.facts.floor;
   }
 
   // Joint torques [J] by stable PD (Tan, Liu & Turk 2011) or plain PD.
   torque(target) {
-    const { data, facts } = this, { kp, kd, limit, law } = facts.drive, { dofs, qpos } = facts.joints;
+    const { data, facts } = this,
+      { kp, kd, limit, law } = facts.drive,
+      { dofs, qpos } = facts.joints;
     const h = law === "pd" ? 0 : facts.step;
-    const wanted = dofs.map((dof, j) =>
-      -kp[j] * (data.qpos[qpos[j]] + h * data.qvel[dof] - target[j]) - kd[j] * data.qvel[dof]);
+    const wanted = dofs.map(
+      (dof, j) =>
+        -kp[j] * (data.qpos[qpos[j]] + h * data.qvel[dof] - target[j]) - kd[j] * data.qvel[dof],
+    );
     if (law !== "pd") {
-      const acceleration = this.predicted(wanted, kd.map(value => h * value));
-      dofs.forEach((dof, j) => { wanted[j] -= h * kd[j] * acceleration[dof]; });
+      const acceleration = this.predicted(
+        wanted,
+        kd.map(value => h * value),
+      );
+      dofs.forEach((dof, j) => {
+        wanted[j] -= h * kd[j] * acceleration[dof];
+      });
     }
     return wanted.map((value, j) => clip(value, -limit[j], limit[j]));
   }
 
   // The next acceleration [nv], with the motors' damping [J] taken implicitly.
   predicted(wanted, damping) {
-    const { data, model: { nv }, facts } = this, { M, qfrc_bias, qfrc_passive } = data;
+    const {
+        data,
+        model: { nv },
+        facts,
+      } = this,
+      { M, qfrc_bias, qfrc_passive } = data;
     const matrix = Array.from({ length: nv }, () => new Float64Array(nv));
-    this.entries.forEach(([row, column], n) => { matrix[row][column] = M[n]; });
+    this.entries.forEach(([row, column], n) => {
+      matrix[row][column] = M[n];
+    });
     const forces = Float64Array.from(qfrc_bias, (bias, i) => qfrc_passive[i] - bias);
-    if (facts.drive.constraint_forces) forces.forEach((_, i) => { forces[i] += this.forces[i]; });
+    if (facts.drive.constraint_forces)
+      forces.forEach((_, i) => {
+        forces[i] += this.forces[i];
+      });
     facts.joints.dofs.forEach((dof, j) => {
       matrix[dof][dof] += damping[j];
       forces[dof] += wanted[j];
@@ -177,32 +227,56 @@ export class Simulation {
 
   // The visitor's spring, and a damper, from a point of a body to a place in the world.
   applyPull() {
-    const { data, pull } = this, applied = data.xfrc_applied.fill(0);
+    const { data, pull } = this,
+      applied = data.xfrc_applied.fill(0);
     if (!pull) return;
-    const { body, target, stiffness, damping, most } = pull, point = this.pulledPoint();
+    const { body, target, stiffness, damping, most } = pull,
+      point = this.pulledPoint();
     const rooted = minus(point, three(data.subtree_com, this.model.body_rootid[body]));
-    const [spin, shift] = [data.cvel.slice(6 * body, 6 * body + 3), data.cvel.slice(6 * body + 3, 6 * body + 6)];
+    const [spin, shift] = [
+      data.cvel.slice(6 * body, 6 * body + 3),
+      data.cvel.slice(6 * body + 3, 6 * body + 6),
+    ];
     const carried = cross(spin, rooted);
-    const force = point.map((value, i) => stiffness * (target[i] - value) - damping * (shift[i] + carried[i]));
+    const force = point.map(
+      (value, i) => stiffness * (target[i] - value) - damping * (shift[i] + carried[i]),
+    );
     const share = Math.min(1, most / Math.max(Math.hypot(...force), 1e-9));
-    force.forEach((value, i) => { force[i] = share * value; });
+    force.forEach((value, i) => {
+      force[i] = share * value;
+    });
     applied.set([...force, ...cross(minus(point, three(data.xipos, body)), force)], 6 * body);
   }
 
   // The place in the world at which the visitor holds a body.
   pulledPoint() {
-    const { data, pull: { body, local } } = this, place = three(data.xpos, body);
-    return turned(data.xmat.slice(9 * body, 9 * body + 9), local).map((value, i) => place[i] + value);
+    const {
+        data,
+        pull: { body, local },
+      } = this,
+      place = three(data.xpos, body);
+    return turned(data.xmat.slice(9 * body, 9 * body + 9), local).map(
+      (value, i) => place[i] + value,
+    );
   }
 
   // Hold a body at a point in the world, as firmly as suits the creature's mass.
   hold(body, point) {
-    const { data, model } = this, rot = data.xmat.slice(9 * body, 9 * body + 9);
+    const { data, model } = this,
+      rot = data.xmat.slice(9 * body, 9 * body + 9);
     const away = minus(point, three(data.xpos, body));
-    const mass = model.body_mass.reduce((sum, value) => sum + value, 0), firmness = 8;
-    this.pull = { body, target: [...point], stiffness: mass * firmness ** 2, damping: mass * firmness,
-                  most: 2 * mass * Math.hypot(...this.plain.gravity),
-                  local: [0, 1, 2].map(column => rot[column] * away[0] + rot[3 + column] * away[1] + rot[6 + column] * away[2]) };
+    const mass = model.body_mass.reduce((sum, value) => sum + value, 0),
+      firmness = 8;
+    this.pull = {
+      body,
+      target: [...point],
+      stiffness: mass * firmness ** 2,
+      damping: mass * firmness,
+      most: 2 * mass * Math.hypot(...this.plain.gravity),
+      local: [0, 1, 2].map(
+        column => rot[column] * away[0] + rot[3 + column] * away[1] + rot[6 + column] * away[2],
+      ),
+    };
   }
 
   letGo() {
@@ -211,15 +285,17 @@ export class Simulation {
 
   // Whether the creature is down, by the certificate's first criterion.
   isDown() {
-    const { data, facts } = this, { trunk, axes, fall, stand_height, forbidden } = facts;
-    const up = dot(three(data.xmat, 3 * trunk + 2), axes.up), high = data.xpos[3 * trunk + 2] / stand_height;
+    const { data, facts } = this,
+      { trunk, axes, fall, stand_height, forbidden } = facts;
+    const up = dot(three(data.xmat, 3 * trunk + 2), axes.up),
+      high = data.xpos[3 * trunk + 2] / stand_height;
     const sane = data.qvel.every(value => Math.abs(value) < BLOWN_UP);
     const fine = sane && up > fall.min_up && high > fall.height[0] && high < fall.height[1];
     return !fine || (fall.touch && forbidden.some(part => !(this.height(part) > 0)));
   }
 }
 
-// Solution of a symmetric positive definite system, of which the lower triangle is given, by Cholesky.
+// Solution of a symmetric positive definite system by Cholesky's method. matrix: its lower triangle.
 // Both arguments are overwritten.
 function solved(matrix, right) {
   const size = right.length;

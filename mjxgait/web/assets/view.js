@@ -1,14 +1,21 @@
-// What the page with physics draws: MuJoCo's bodies in the viewer, what a visitor points at, the string.
+// What the page with physics draws: MuJoCo's bodies, the string, and what a visitor points at.
 //
-// Points and directions that go in and out are MuJoCo's, in m. `scene` is what the viewer draws with.
+// Points and directions that go in and out are MuJoCo's, in m. `scene` is the viewer's own.
 
-const NEAR = [[0, 0], ...Array.from({ length: 8 }, (_, i) => [Math.cos(i * Math.PI / 4), Math.sin(i * Math.PI / 4)])];
+const NEAR = [
+  [0, 0],
+  ...Array.from({ length: 8 }, (_, i) => [
+    Math.cos((i * Math.PI) / 4),
+    Math.sin((i * Math.PI) / 4),
+  ]),
+];
 
 export class View {
   // facts: `page` of mjxgait/web/physics.py.
   constructor(viewer, overlay, facts) {
     Object.assign(this, { viewer, overlay, facts });
-    this.scene = viewer[Object.getOwnPropertySymbols(viewer).find(symbol => symbol.description === "scene")];
+    this.scene =
+      viewer[Object.getOwnPropertySymbols(viewer).find(symbol => symbol.description === "scene")];
     const found = name => this.scene.getObjectByName(name);
     [this.ground, this.world, this.floor] = ["ground", "world", "floor"].map(found);
     this.bodies = facts.bodies.map(body => [body, found(`body_${body}`)]);
@@ -20,7 +27,9 @@ export class View {
 
   // Only the creature casts a shadow, which does not fade with the extent of the floor's tiles.
   setFloor() {
-    const { scene, facts, floor, camera } = this, { shadow } = scene, reach = facts.extent;
+    const { scene, facts, floor, camera } = this,
+      { shadow } = scene,
+      reach = facts.extent;
     const dark = matchMedia("(prefers-color-scheme: dark)").matches;
     floor.traverse(part => {
       part.layers.set(1);
@@ -36,7 +45,8 @@ export class View {
 
   // Draw the present state. follow: whether the camera goes along. seconds: since the last drawing.
   draw(simulation, follow, seconds) {
-    const { data, model } = simulation, { trunk } = simulation.facts;
+    const { data, model } = simulation,
+      { trunk } = simulation.facts;
     const place = this.vector(data.xpos[3 * trunk], data.xpos[3 * trunk + 1], 0);
     this.offset ??= place.clone();
     if (follow) this.offset.lerp(place, 1 - Math.exp(-seconds / 0.15));
@@ -45,14 +55,18 @@ export class View {
       const [w, x, y, z] = data.xquat.slice(4 * body, 4 * body + 4);
       node.quaternion.set(x, y, z, w);
     }
-    const axes = this.world.quaternion, here = place.applyQuaternion(axes);
+    const axes = this.world.quaternion,
+      here = place.applyQuaternion(axes);
     this.world.position.copy(this.offset).applyQuaternion(axes).negate();
     // The floor's pattern stays where it is in the world; its patch goes along with the creature.
     const tile = value => this.facts.apart * Math.round(value / this.facts.apart);
     this.floor.position.set(tile(here.x), 0, tile(here.z)).add(this.world.position);
-    const down = this.vector(...model.opt.gravity).applyQuaternion(axes).normalize();
+    const down = this.vector(...model.opt.gravity)
+      .applyQuaternion(axes)
+      .normalize();
     this.ground.quaternion.setFromUnitVectors(down, this.vector(0, -1, 0));
-    const { shadow } = this.scene, beside = here.add(this.world.position);
+    const { shadow } = this.scene,
+      beside = here.add(this.world.position);
     shadow.position.set(beside.x, 0, beside.z);
     shadow.needsUpdate = true;
     this.scene.queueRender();
@@ -70,15 +84,19 @@ export class View {
   // The ray from the camera through a place on the screen: its origin and unit direction, [3] each.
   ray(clientX, clientY) {
     const box = this.viewer.getBoundingClientRect();
-    const screen = [2 * (clientX - box.left) / box.width - 1, 1 - 2 * (clientY - box.top) / box.height];
+    const screen = [
+      (2 * (clientX - box.left)) / box.width - 1,
+      1 - (2 * (clientY - box.top)) / box.height,
+    ];
     const end = this.world.worldToLocal(this.vector(...screen, 0.5).unproject(this.camera));
     const eye = this.world.worldToLocal(this.camera.getWorldPosition(this.vector(0, 0, 0)));
     return { origin: eye.toArray(), direction: end.sub(eye).normalize().toArray() };
   }
 
-  // What is at a place on the screen, or at most `reach` pixels beside it: body, point and distance.
+  // Body, point and distance of what is at a place on the screen, or `reach` pixels beside it.
   pick(simulation, clientX, clientY, reach) {
-    const { mujoco, model, data } = simulation, geom = new mujoco.IntBuffer(1);
+    const { mujoco, model, data } = simulation,
+      geom = new mujoco.IntBuffer(1);
     try {
       for (const [x, y] of NEAR) {
         const { origin, direction } = this.ray(clientX + reach * x, clientY + reach * y);
@@ -102,7 +120,10 @@ export class View {
   // Pixels [2] of a point, from the viewer's upper left corner.
   pixel(point) {
     const seen = this.world.localToWorld(this.vector(...point)).project(this.camera);
-    return [(seen.x + 1) / 2 * this.viewer.clientWidth, (1 - seen.y) / 2 * this.viewer.clientHeight];
+    return [
+      ((seen.x + 1) / 2) * this.viewer.clientWidth,
+      ((1 - seen.y) / 2) * this.viewer.clientHeight,
+    ];
   }
 
   // Draw a line between two points, or none. Its class is its look.
