@@ -1,22 +1,25 @@
 """Numbers that a page needs to simulate a champion itself, as one JSON document.
 
-`assets/simulation.js` and `assets/key_poses.js` read it. Names are those of
+`assets/simulation.js`, `key_poses.js` and `expressions.js` read it. Names are those of
 docs/reference/controller.md; angles in rad, lengths in m.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import mujoco
 import numpy as np
 
 from mjxgait.certification import CertificateConfig
 from mjxgait.certification.acceptance import how_simulated
-from mjxgait.champion import Champion
+from mjxgait.champion import Champion, serializer_of
 from mjxgait.controllers.key_poses.config import gene_names
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import support_extents
 from mjxgait.errors import UserError
+from mjxgait.reference.controllers import reference_of
 from mjxgait.reference.layout import FLOOR, start_frame
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.reference.state import FOOT_SENSES
 from mjxgait.reference.stepping import examined_model
 
 Facts = dict[str, object]
@@ -34,6 +37,8 @@ def facts_of(creature: Creature, champion: Champion) -> Facts:
     model, frame, start = examined_model(creature), creature.frame, start_frame(creature)
     task = how_simulated(champion.task, champion.wish)
     fall = task.fall(CertificateConfig())
+    aims = task.aimed(nominal_starts(creature, 1), CertificateConfig())
+    reference = reference_of(creature, champion, float(model.opt.timestep))
     headings = task.commanded_heading(2, 1.0)
     watched = len(creature.feet.foot_of)
     return {
@@ -50,19 +55,28 @@ def facts_of(creature: Creature, champion: Champion) -> Facts:
         "drive": _drive(creature, champion),
         "turn": None if headings is None else float(headings[1]),
         "floor": float(model.geom(FLOOR).pos[2]),
-        "feet": _feet(creature),
+        "goal": float(aims.goal[0]),
+        "bar": _bounded(aims.bar[0, 0]),
+        "feet": _feet(creature, seen=any(name in FOOT_SENSES for name in reference.reads)),
         "forbidden": _parts(model, creature.feet.seen[watched:]),
         "fall": {"min_up": fall.min_up, "height": list(fall.height), "touch": fall.touch},
-        "controller": _controller(creature, champion),
+        "kind": champion.controller,
+        "controller": CONTROLLERS[champion.controller](creature, champion),
+        "every": reference.every,
     }
 
 
 def _check(creature: Creature, champion: Champion) -> None:
     name = creature.name
-    if champion.controller != "poses":
+    if champion.controller not in CONTROLLERS:
         raise UserError(
-            f'{name}: a page with physics runs key poses, not the controller "{champion.controller}"; '
-            "leave --physics out, and the page plays the recorded walk"
+            f"{name}: a page with physics runs key poses and expressions, not the controller "
+            f'"{champion.controller}"; leave --physics out, and the page plays the recorded walk'
+        )
+    if how_simulated(champion.task).next_goal(np.ones(1), np.ones(1), np.ones(1))[0] > 1:
+        raise UserError(
+            f'{name}: a page with physics has one goal, and those of "{champion.task}" move on; leave '
+            "--physics out"
         )
     if not creature.terrain.flat:
         raise UserError(
@@ -79,6 +93,12 @@ def _check(creature: Creature, champion: Champion) -> None:
 
 def _lists(**arrays: np.ndarray) -> dict[str, list[float]]:
     return {name: np.asarray(array, float).tolist() for name, array in arrays.items()}
+
+
+def _bounded(values: np.ndarray) -> list[float] | float:
+    """JSON has no infinity; a number that no angle and no way reaches stands for it."""
+    bounded: list[float] | float = np.nan_to_num(values, posinf=1e9, neginf=-1e9).tolist()
+    return bounded
 
 
 def _drive(creature: Creature, champion: Champion) -> Facts:
@@ -101,11 +121,11 @@ def _parts(model: mujoco.MjModel, geoms: Sequence[int]) -> list[Facts]:
     ]
 
 
-def _feet(creature: Creature) -> Facts:
+def _feet(creature: Creature, seen: bool) -> Facts:
     """Geoms by foot. seen: whether the controller observes the feet."""
     parts = _parts(creature.model, creature.feet.stepping)
     return {
-        "seen": creature.corrections.steps,
+        "seen": seen,
         "parts": [
             [part for part, of in zip(parts, creature.feet.geoms, strict=True) if of == foot]
             for foot in range(len(creature.feet.names))
@@ -113,7 +133,7 @@ def _feet(creature: Creature) -> Facts:
     }
 
 
-def _controller(creature: Creature, champion: Champion) -> Facts:
+def _poses(creature: Creature, champion: Champion) -> Facts:
     joints, weights, settings = creature.joints, creature.corrections, champion.settings
     names, tuning = gene_names(weights.steps), champion.genome["tuning"]
     mirror, stepping = creature.mirror, weights.stepping
@@ -130,10 +150,10 @@ def _controller(creature: Creature, champion: Champion) -> Facts:
         "body_length": float(creature.frame.body_length),
         "hip_height": float(creature.frame.hip_height),
         "foot_places": creature.feet.places.tolist(),
-        # JSON has no infinity; an endless joint gets a bound that no angle reaches.
         "joints": {
-            name: np.nan_to_num(array, posinf=1e9, neginf=-1e9).tolist()
-            for name, array in (("stand", joints.stand), ("low", joints.low), ("high", joints.high))
+            "stand": joints.stand.tolist(),
+            "low": _bounded(joints.low),
+            "high": _bounded(joints.high),
         },
         "weights": {
             **_lists(
@@ -150,3 +170,20 @@ def _controller(creature: Creature, champion: Champion) -> Facts:
             },
         },
     }
+
+
+def _program(creature: Creature, champion: Champion) -> Facts:
+    settings = champion.settings
+    texts = serializer_of("program").document(champion.genome, settings, creature)["expressions"]
+    return {
+        "expressions": [texts[joint] for joint in creature.joints.names],
+        "low": _bounded(creature.joints.pose_low),
+        "high": _bounded(creature.joints.pose_high),
+    }
+
+
+CONTROLLERS: Mapping[str, Callable[[Creature, Champion], Facts]] = {
+    "poses": _poses,
+    "program": _program,
+}
+"""Facts of each kind of controller that a page can run."""

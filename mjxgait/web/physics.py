@@ -20,7 +20,12 @@ from mjxgait.web.wasm import PACKAGE, VERSION, Engine, engine_from
 
 SECONDS = 5.0
 """s of the champion's walk that are simulated for the notice on its certificate."""
-CLASSES = {"key_poses.js": "KeyPoses", "simulation.js": "Simulation", "view.js": "View"}
+CLASSES = {
+    "key_poses.js": "KeyPoses",
+    "expressions.js": "Expressions",
+    "simulation.js": "Simulation",
+    "view.js": "View",
+}
 """Modules that the page's own script, `physics.js`, uses, and the class of each."""
 FAR, FARTHEST = 2.4, 3.0
 """Camera distance in units of the creature's size, and the largest in units of that."""
@@ -60,7 +65,7 @@ def build_physics_page(creature: Creature, facts: Facts, engine: Engine, said: s
     }
     lead = (
         "This is physics, not animation: MuJoCo runs in this page, and the evolved controller moves "
-        f"the joints. {said or 'The undisturbed walk is certified'}."
+        f"the joints. {said or 'Undisturbed, it is certified'}."
     )
     contents = (
         f"MuJoCo {VERSION} (npm package {PACKAGE}, Google DeepMind) and model-viewer (Google), both "

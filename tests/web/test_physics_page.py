@@ -132,9 +132,11 @@ def test_it_fits_a_phone_and_answers_a_finger(browser, page, tab):
 
 def test_a_controller_or_ground_that_a_page_cannot_run_is_refused(stool):
     champion = treading(stool)
-    other = dataclasses.replace(champion, controller="expressions")
-    with pytest.raises(UserError, match=r'key poses, not the controller "expressions"'):
+    other = dataclasses.replace(champion, controller="sims")
+    with pytest.raises(UserError, match=r'expressions, not the controller "sims"'):
         facts_of(stool, other)
+    with pytest.raises(UserError, match=r'those of "travel" move on'):
+        facts_of(stool, dataclasses.replace(champion, task="travel"))
     hilly = dataclasses.replace(stool, terrain=parse_ground("bumps:0.05"))
     with pytest.raises(UserError, match="bumps"):
         facts_of(hilly, champion)

@@ -9,6 +9,7 @@ import json
 import subprocess
 from importlib import resources
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -17,8 +18,13 @@ from rendering.made_up import falling, treading
 from web.engine import engine_folder, node
 
 from mjxgait.certification.trials import simulate
+from mjxgait.config.layers import data_folder
+from mjxgait.controllers.expressions.written import written_champion
 from mjxgait.controllers.key_poses.config import DriveConfig, PoseConfig
+from mjxgait.creature import load_creature
 from mjxgait.creature.anatomy import Stepping
+from mjxgait.plugins import resolve_config
+from mjxgait.plugins.registry import build_config
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.training.folder import open_champion
 from mjxgait.web.facts import facts_of
@@ -72,6 +78,24 @@ def with_forces(stool):
     return stool, dataclasses.replace(plain, drive=DriveConfig(constraint_forces=True))
 
 
+PROGRAM = """(list
+    (* 0.2 (- (ifltz a0 (* 2 pz) (min a2 w0)) (/ a1 (+ t 0.5))))
+    (+ (* 0.3 (- s0 vx)) (* 0.1 (+ c0 pitch)))
+    (* 0.3 (max (sin (* 9 beat)) (- (cos (* 3 px)) (abs vz)))))"""
+
+
+def with_expressions():
+    """The lamp under a program with most functions and observations, held for four steps."""
+    luxo = load_creature(data_folder("envs") / "luxo")
+    usual = dataclasses.asdict(resolve_config(luxo.settings.train, "luxo"))
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "program.txt"
+        file.write_text(PROGRAM)
+        champion = written_champion(luxo, build_config(usual, "luxo"), file)
+    assert champion.settings.every == 4
+    return luxo, champion
+
+
 CASES = {
     # name: creature and champion, s, disturbances, push
     "evolved": lambda stool: (*open_champion(WALK), 5.0, None, None),
@@ -80,6 +104,7 @@ CASES = {
     "by the clock": lambda stool: (*by_the_clock(stool), 1.5, None, None),
     "constraint forces": lambda stool: (*with_forces(stool), 1.0, None, None),
     "falls": lambda stool: (stool, falling(stool), 1.0, None, None),
+    "expressions": lambda stool: (*with_expressions(), 1.5, None, None),
 }
 
 
@@ -148,6 +173,7 @@ def test_the_comparison_can_fail(stool, walked):
     assert np.abs(plain[:before] - disturbed[:before]).max() > 1e5 * TOLERANCE
     assert np.isfinite(walked["falls"][1][2])
     assert np.isinf(walked["evolved"][1][2])
+    assert np.ptp(walked["expressions"][1][1], axis=0).min() > 0.01
     for name, change in {
         "by the clock": {"wish": {}},
         "steps under a fall": {"drive": DriveConfig(law="pd")},

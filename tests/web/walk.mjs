@@ -6,10 +6,12 @@ const { engine, assets, cases } = JSON.parse(readFileSync(0, "utf8"));
 const of = async file => import(pathToFileURL(file));
 const mujoco = await (await of(`${engine}/mujoco.js`)).default();
 const { KeyPoses } = await of(`${assets}/key_poses.js`);
+const { Expressions } = await of(`${assets}/expressions.js`);
 const { Simulation } = await of(`${assets}/simulation.js`);
+const CONTROLLERS = { poses: KeyPoses, program: Expressions };
 
 function walk({ facts, steps, disturbed, push }) {
-  const simulation = new Simulation(mujoco, facts, new KeyPoses(facts.controller));
+  const simulation = new Simulation(mujoco, facts, new CONTROLLERS[facts.kind](facts.controller));
   if (disturbed) {
     simulation.setMass(disturbed.mass);
     simulation.setFriction(disturbed.friction);

@@ -1,7 +1,8 @@
 // The page with physics: loads MuJoCo, keeps real time, and lets a visitor disturb the creature.
 //
 // Scripts before it define these.
-const { KeyPoses, Simulation, View, loadMujoco } = globalThis;
+const { KeyPoses, Expressions, Simulation, View, loadMujoco } = globalThis;
+const CONTROLLERS = { poses: KeyPoses, program: Expressions };
 
 const element = id => document.getElementById(id);
 const json = id => JSON.parse(element(id).textContent);
@@ -24,7 +25,10 @@ async function unpacked(id) {
 async function start() {
   const [facts, page] = [json("facts"), json("page")];
   const mujoco = await loadMujoco({ wasmBinary: await unpacked("engine") });
-  const simulation = new Simulation(mujoco, facts, new KeyPoses(facts.controller));
+  const controller = new CONTROLLERS[facts.kind](facts.controller);
+  const simulation = new Simulation(mujoco, facts, controller);
+  // Expressions have no cycle whose speed could change.
+  element("pace").closest("label").hidden = facts.kind !== "poses";
   const view = new View(viewer, element("overlay"), page);
   const state = {
     paused: false,

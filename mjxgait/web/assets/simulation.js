@@ -18,6 +18,8 @@ const three = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
 const turned = (rot, v) => [0, 1, 2].map(row => dot(three(rot, row), v));
 
 const BLOWN_UP = 1e4;
+// m; a foot nearer to the floor counts as in contact.
+const CONTACT_GAP = 0.002;
 
 export class Simulation {
   // facts: of mjxgait/web/facts.py. controller: has `init` and `act`, as in key_poses.js.
@@ -107,12 +109,10 @@ export class Simulation {
 
   // One control step.
   step() {
-    const { mujoco, model, data, facts } = this,
-      senses = this.senses();
-    const { target, memory } = this.controller.act(this.memory, senses, this.pace);
-    this.target = target;
-    this.memory = memory;
-    const torque = this.torque(target),
+    const { mujoco, model, data, facts } = this;
+    if (this.steps % facts.every === 0)
+      Object.assign(this, this.controller.act(this.memory, this.senses(), this.pace));
+    const torque = this.torque(this.target),
       applied = data.qfrc_applied;
     facts.joints.dofs.forEach((dof, j) => {
       applied[dof] = torque[j];
@@ -139,13 +139,35 @@ export class Simulation {
     const free = this.turn === null;
     return {
       joint_pos: facts.joints.qpos.map(adr => qpos[adr]),
+      ...this.plainSenses(place),
       heading: free ? heading : wrapped(heading - this.heading),
-      aside: free ? dot(minus(place, start.place), start.left) : 0,
+      ...(free ? {} : { aside: 0 }),
       pitch: -Math.asin(clip(forward[2], -1, 1)),
       roll: Math.asin(clip(left[2], -1, 1)),
       pitch_rate: dot(spin, left),
       roll_rate: dot(spin, forward),
       ...(facts.feet.seen ? this.footSenses(forward, place, qvel) : {}),
+    };
+  }
+
+  // Observations of time, joints, place and velocity.
+  plainSenses(place) {
+    const { data, facts, time } = this,
+      { start, root_dof, goal, bar } = facts;
+    const moved = minus(place, start.place),
+      velocity = data.qvel.slice(root_dof, root_dof + 3);
+    const forward = dot(moved, start.forward);
+    return {
+      time,
+      beat: 2 * (time - Math.floor(time)) - 1,
+      joint_vel: facts.joints.dofs.map(dof => data.qvel[dof]),
+      trunk_height: place[2],
+      forward,
+      aside: dot(moved, start.left),
+      forward_vel: dot(velocity, start.forward),
+      up_vel: velocity[2],
+      goal_distance: goal - forward,
+      bar_distance: bar - forward,
     };
   }
 
@@ -160,8 +182,10 @@ export class Simulation {
       [0, 1, 2].map(
         axis => geoms.reduce((sum, { geom }) => sum + geom_xpos[3 * geom + axis], 0) / geoms.length,
       );
+    const foot_height = feet.parts.map(geoms => Math.min(...geoms.map(one => this.height(one))));
     return {
-      foot_height: feet.parts.map(geoms => Math.min(...geoms.map(one => this.height(one)))),
+      foot_height,
+      contact: foot_height.map(height => (height < CONTACT_GAP ? 1 : 0)),
       foot_place: feet.parts.map(geoms => {
         const away = minus(middle(geoms), place);
         return [dot(away, nose), dot(away, beside)];
