@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
+from mjxgait.cli.options import Verbosity, parsed
 from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Physics
 from mjxgait.config.tables import (
@@ -38,7 +39,7 @@ EXPECTED_SPEED = 0.8e6
 
 
 @dataclasses.dataclass(frozen=True)
-class AblateOptions:
+class AblateOptions(Verbosity):
     """Run a study, variants times seeds side by side, with a report (docs/research/ablations.md).
 
     Writes report.md, report.html, results.csv and generations.parquet into the study folder.
@@ -78,7 +79,7 @@ class AblateOptions:
 
 def ablate_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(AblateOptions, args=list(arguments), prog="mjxgait ablate")
+    options = parsed(AblateOptions, "ablate", arguments)
     from mjxgait.experiments.ablation.plan import check_variants, make_plan, read_study
     from mjxgait.experiments.ablation.report import write_report
     from mjxgait.experiments.ablation.rows import measure, read_logs

@@ -7,6 +7,7 @@ from pathlib import Path
 import tyro
 
 from mjxgait.api import examine, examine_expressions
+from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
 from mjxgait.files import write_text
 from mjxgait.training.folder import CERTIFICATE
@@ -47,7 +48,7 @@ class CertifyOptions:
 
 def certify_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(CertifyOptions, args=list(arguments), prog="mjxgait certify")
+    options = parsed(CertifyOptions, "certify", arguments)
     if options.expressions is not None:
         return _certify_expressions(options, options.expressions)
     if options.run is None or options.env or options.out:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
+from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class ExportOptions:
 
 def export_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(ExportOptions, args=list(arguments), prog="mjxgait export")
+    options = parsed(ExportOptions, "export", arguments)
     from mjxgait.animation.export import read_character, walk_loop
     from mjxgait.rendering.video import LOOP_SECONDS, champion_of
     from mjxgait.rendering.walk import doubt

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
+from mjxgait.cli.options import parsed
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.files import write_text, writing
@@ -62,7 +63,7 @@ class ImportOptions:
 
 def import_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(ImportOptions, args=list(arguments), prog="mjxgait import")
+    options = parsed(ImportOptions, "import", arguments)
     choices = ImportChoices(
         options.name,
         tuple(map(Path, options.search)),

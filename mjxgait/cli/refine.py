@@ -11,6 +11,7 @@ import tyro
 
 from mjxgait.api import Run, load_creature
 from mjxgait.api.make import evolve
+from mjxgait.cli.options import Verbosity, parsed
 from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import read_toml
 from mjxgait.creature import Creature
@@ -24,7 +25,7 @@ from mjxgait.training.folder import (
 
 
 @dataclasses.dataclass(frozen=True)
-class RefineOptions:
+class RefineOptions(Verbosity):
     """Make a hand-made or captured cycle walk: its key poses change only within --keep.
 
     Attributes:
@@ -69,7 +70,7 @@ class RefineOptions:
 
 def refine_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(RefineOptions, args=list(arguments), prog="mjxgait refine")
+    options = parsed(RefineOptions, "refine", arguments)
     from mjxgait.animation.keys import bring, refine
     from mjxgait.animation.keys.refine import base_settings, begin, refining
 

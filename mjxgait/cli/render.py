@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
 from mjxgait.files import replaced, writing
 
@@ -55,7 +56,7 @@ class RenderOptions:
 
 def render_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(RenderOptions, args=list(arguments), prog="mjxgait render")
+    options = parsed(RenderOptions, "render", arguments)
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     # If the variable names a missing GL library, the import of MuJoCo fails: only the drawing
     # process may see it.

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import tyro
 from rich.console import Console
 
 from mjxgait.api import load_creature
+from mjxgait.cli.options import Verbosity, parsed
 from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import build, merge
 from mjxgait.creature import Creature
@@ -36,7 +36,7 @@ OF_FILES = ("rate", "travelling", "blends", "cluster")
 
 
 @dataclasses.dataclass(frozen=True)
-class RepertoireOptions:
+class RepertoireOptions(Verbosity):
     """Evolve a grid of walks, speeds by turns, side by side, each seeded from its neighbours.
 
     Examines each walk. Writes the certified ones as clips of one GLB, in phase, with a table of
@@ -85,7 +85,7 @@ class RepertoireOptions:
 
 def repertoire_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(RepertoireOptions, args=list(arguments), prog="mjxgait repertoire")
+    options = parsed(RepertoireOptions, "repertoire", arguments)
     plan = None if options.resume else planned(options)
     folder, grid = _resumed(options) if plan is None else (plan.folder, plan.grid)
     # JAX takes a second to import, so the options are checked first.

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import tyro
 
+from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
 
 
@@ -27,7 +28,7 @@ class ShareOptions:
 
 def share_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(ShareOptions, args=list(arguments), prog="mjxgait share")
+    options = parsed(ShareOptions, "share", arguments)
     if options.out.suffix.lower() not in (".html", ".htm"):
         raise UserError(
             f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
