@@ -16,7 +16,9 @@ class Output:
     """Prints results, and progress unless quiet."""
 
     def __init__(self, console: Console | None = None, quiet: bool = False) -> None:
-        self.console = console or Console(highlight=False, soft_wrap=True, markup=False)
+        self.console = console or Console(
+            highlight=False, soft_wrap=True, markup=False, emoji=False
+        )
         self.progress = Console(file=io.StringIO(), quiet=True) if quiet else self.console
 
     def say(self, text: str) -> None:

@@ -19,10 +19,13 @@ from mjxgait.creature import load_creature as load_folder
 from mjxgait.creature.scale import at_step, facing, load_files, scaled
 from mjxgait.errors import UserError
 from mjxgait.training.examination import Exams
-from mjxgait.training.folder import CERTIFICATE, EXAMS, check_run, command, create_run
+from mjxgait.training.folder import CERTIFICATE, EXAMS, Line, check_run, command, create_run
 
 if TYPE_CHECKING:
     from mjxgait.training.screen import Screen
+
+OnGeneration = Callable[[Line], object]
+"""Called with the line of a generation in `metrics.jsonl`."""
 
 
 def load_creature(
@@ -75,6 +78,7 @@ def train(
     generations: int | None = None,
     settings: Table | None = None,
     quiet: bool = False,
+    on_generation: OnGeneration | None = None,
 ) -> Run:
     """Evolve a creature, examine its champion, and return the run.
 
@@ -101,7 +105,10 @@ def train(
       population: individuals of a generation.
       generations: the most that are evolved.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
-      quiet: prints nothing.
+      quiet: prints nothing; the logger "mjxgait" gets the progress (level INFO).
+      on_generation: called after each generation with its line of `metrics.jsonl`, a dict with
+        `generation`, `best`, `mean` and more. What it raises ends the run; `mjxgait train --resume`
+        goes on.
 
     Raises:
       UserError: an invalid argument, explained in one sentence.
@@ -130,7 +137,8 @@ def train(
         chosen = with_expressions(creature, chosen, Path(expressions))
     folder = check_run(Path(out) if out else None, creature, chosen)
     begin = partial(create_run, folder, creature, chosen)
-    return _evolved(folder, creature, chosen, quiet, begin, Path(source) if source else None)
+    initial = Path(source) if source else None
+    return _evolved(folder, creature, chosen, quiet, begin, initial, on_generation)
 
 
 def refine(
@@ -150,6 +158,7 @@ def refine(
     generations: int | None = None,
     settings: Table | None = None,
     quiet: bool = False,
+    on_generation: OnGeneration | None = None,
 ) -> Run:
     """Evolve a walk near a hand-made or captured cycle, and return the run (docs/guide/refine.md).
 
@@ -173,6 +182,7 @@ def refine(
       generations: as for `train`.
       settings: as for `train`.
       quiet: as for `train`.
+      on_generation: as for `train`.
 
     Raises:
       UserError: an invalid argument or file, explained in one sentence.
@@ -190,7 +200,7 @@ def refine(
     chosen = near.refining(base, brought, keep)
     folder = check_run(Path(out) if out else None, creature, chosen)
     begins = partial(near.begin, folder, creature, chosen, source, brought)
-    return _evolved(folder, creature, chosen, quiet, begins)
+    return _evolved(folder, creature, chosen, quiet, begins, on_generation=on_generation)
 
 
 def _evolved(
@@ -200,6 +210,7 @@ def _evolved(
     quiet: bool,
     begin: Callable[[], object],
     source: Path | None = None,
+    on_generation: OnGeneration | None = None,
 ) -> Run:
     """Evolve and examine a run in a new folder; return it.
 
@@ -211,7 +222,8 @@ def _evolved(
     from mjxgait.training.stages import prepare_devices
 
     prepare_devices()
-    screen = Screen(Console(quiet=True)) if quiet else Screen()
+    listeners = (on_generation,) if on_generation else ()
+    screen = Screen(Console(quiet=True) if quiet else None, listeners=listeners)
     evolve(folder, creature, config, screen, begin=begin, source=source)
     return Run(folder)
 

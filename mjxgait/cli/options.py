@@ -31,7 +31,7 @@ SIMILAR = "Perhaps you meant"
 NUMBERS = {int: "give a whole number", float: "give a number"}
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Verbosity:
     """Options of commands that take minutes.
 

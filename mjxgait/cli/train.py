@@ -3,7 +3,7 @@
 import argparse
 import contextlib
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -47,7 +47,8 @@ def train_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     if {"-h", "--help"} & set(arguments):
         parsed(short_options(), "train", ["--help"])
-    creature, default = _layers(arguments)
+    notes: list[str] = []
+    creature, default = _layers(arguments, notes.append)
     shape = options_of(type(default))
     options = parsed(shape, "train", arguments, shape(settings=default))
     config = _settings(options)
@@ -62,8 +63,9 @@ def train_command(arguments: Sequence[str]) -> int:
         )
     if options.source and (options.resume or options.runs is not None):
         raise UserError("--from: for a single new run, without --resume and --runs")
-    if said := hint(config):
-        print(said)
+    if not options.quiet:
+        for line in (*notes, *filter(None, [hint(config)])):
+            print(line)
     if options.runs is not None or _is_zoo(options.resume):
         return _several(options, creature, config, default)
     if options.generation is not None and options.resume is None:
@@ -103,7 +105,7 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
     prepare_devices(1 if options.cluster else None)
     resumed = options.resume is not None
     with contextlib.ExitStack() as beside:
-        screen = beside.enter_context(tracked(folder, options.log))
+        screen = beside.enter_context(tracked(folder, options.log, options.quiet))
 
         def begin() -> None:
             if not resumed:
@@ -129,14 +131,14 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
         together = 1 if options.cluster else 0
         zoo = check_zoo(options.out, creature, config, options.runs)
         begin = partial(create_zoo, zoo, creature, config, options.runs, together)
-        return evolve_zoo(zoo, options.cluster, begin)
+        return evolve_zoo(zoo, options.cluster, begin, options.quiet)
     other = options.scale or options.way != "forward"
     if options.runs is not None or other or config != default:
         raise UserError(
             f"{options.resume}: resumed runs keep their number, body and settings; only --cluster "
             "may be given"
         )
-    return evolve_zoo(options.resume, options.cluster)
+    return evolve_zoo(options.resume, options.cluster, quiet=options.quiet)
 
 
 def _is_zoo(folder: Path | None) -> bool:
@@ -171,8 +173,13 @@ def _plot_fitness(folder: Path) -> None:
             plot_fitness(lines, folder / PLOT)
 
 
-def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
-    """Return the creature and the settings below the options; they are the options' defaults."""
+def _layers(
+    arguments: Sequence[str], tell: Callable[[str], object] = lambda said: None
+) -> tuple[Creature, Config]:
+    """Return the creature and the settings below the options; they are the options' defaults.
+
+    tell: called with the notes of the import of a model file.
+    """
     early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for name in ("--env", "--config", "--resume", "--use.controller", "--use.task"):
         early.add_argument(name, nargs="?")
@@ -194,7 +201,7 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
         return open_run(folders_of(folder)[0] if is_zoo(folder) else folder)
     scales = parse_scales(given.scale or ())
     way = given.way or "forward"
-    creature = load_creature(given.env or TrainOptions.env, scales, print, way)
+    creature = load_creature(given.env or TrainOptions.env, scales, tell, way)
     file = Path(given.config) if given.config else None
     named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
     use = {kind: name for kind, name in named.items() if name}
