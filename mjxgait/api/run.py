@@ -99,6 +99,12 @@ class Run:
             for name in names
         }
 
+    def _repr_html_(self) -> str:
+        """Show the result and the walk in a notebook."""
+        from mjxgait.api.notebook import shown
+
+        return shown(self)
+
     def frame(self) -> "pandas.DataFrame":
         """Return `metrics.jsonl` as a table, a row per generation; without `mothers`.
 

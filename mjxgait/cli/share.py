@@ -7,7 +7,6 @@ from pathlib import Path
 import tyro
 
 from mjxgait.cli.options import parsed
-from mjxgait.errors import UserError
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,19 +28,7 @@ class ShareOptions:
 def share_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     options = parsed(ShareOptions, "share", arguments)
-    if options.out.suffix.lower() not in (".html", ".htm"):
-        raise UserError(
-            f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
-        )
-    from mjxgait.experiments.repertoire.clips import write_driven
-    from mjxgait.experiments.repertoire.grid import GRID
-    from mjxgait.training.stored import require_writable
-    from mjxgait.web.page import write_page
+    from mjxgait.api.exports import share
 
-    require_writable(options.out)
-    write = write_driven if (options.run / GRID).is_file() else write_page
-    said = write(options.run, options.out)
-    print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB)")
-    if said:
-        print(said)
+    share(options.run, options.out, tell=print)
     return 0
