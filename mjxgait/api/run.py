@@ -1,6 +1,7 @@
 """A run folder as an object."""
 
 import dataclasses
+import html
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -101,9 +102,15 @@ class Run:
 
     def _repr_html_(self) -> str:
         """Show the result and the walk in a notebook."""
-        from mjxgait.api.notebook import shown
+        place = f"<code>{html.escape(str(self.folder))}</code>"
+        if not (self.folder / CHAMPION).exists():
+            return f"<p>{place}: no champion yet</p>"
+        from mjxgait.rendering.notebook import walk_image
 
-        return shown(self)
+        verdict = "certified" if self.certified else "not certified"
+        words = f"{html.escape(self.creature.name)}, {verdict}"
+        fitness = f"fitness {self.champion.fitness:.3f}"
+        return f"<p>{place}: {words}, {fitness}</p>{walk_image(self.folder)}"
 
     def frame(self) -> "pandas.DataFrame":
         """Return `metrics.jsonl` as a table, a row per generation; without `mothers`.

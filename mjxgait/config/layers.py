@@ -59,7 +59,7 @@ def find_creature(name: str) -> Path:
         raise UserError(f"{folder}: no such file or folder")
     raise UserError(
         f'unknown creature "{name}"; {did_you_mean(name, known)} '
-        "(`mjxgait envs` lists all; the path of a folder or of a model file will do too)"
+        "(`mjxgait list` lists all; the path of a folder or of a model file will do too)"
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from animation.keys.made import columns, swings
-from end_to_end.shipped import CONFIGS, CREATURES, ROOT
+from end_to_end.shipped import CONFIGS, CREATURES, ROOT, STUDIES, STYLES, TASKS
 from end_to_end.walks import short_examination, small_settings, trained, walker
 from helpers import STOOL, said_by
 
@@ -23,6 +23,7 @@ ELSEWHERE = {
 }
 """Subcommands with their own tests, and where."""
 
+SHELLS = ("bash", "zsh", "fish")
 Made = Callable[[Path], tuple[list[str], str]]
 """Makes the arguments of a subcommand in a folder, and names the file it writes there."""
 
@@ -70,7 +71,10 @@ FORMS: dict[str, list[Made]] = {
     "check": [
         lambda folder, name=name: ([name, "--out", "seen.png"], "seen.png") for name in CREATURES
     ],
-    "envs": [lambda folder: ([], "")],
+    "list": [lambda folder: ([], "")],
+    "doctor": [lambda folder: ([], "")],
+    "cache": [lambda folder: ([], ""), lambda folder: (["show"], "")],
+    "completion": [lambda folder, shell=shell: ([shell], "") for shell in SHELLS],
 }
 EACH = [(name, number) for name, forms in FORMS.items() for number in range(len(forms))]
 
@@ -94,9 +98,29 @@ def test_every_subcommand_is_tested():
         assert f"def {test}" in (ROOT / file).read_text(encoding="utf-8")
 
 
-def test_envs_lists_all_creatures_and_configurations(capsys: pytest.CaptureFixture):
-    said = said_by(capsys, "envs", code=0)
-    assert [line.split()[0] for line in said.splitlines()] == [*CREATURES, *CONFIGS]
+def test_list_names_everything_that_ships(capsys: pytest.CaptureFixture):
+    said = said_by(capsys, "list", code=0)
+    sections = [section.splitlines() for section in said.strip().split("\n\n")]
+    named = {head.split()[0]: [line.split()[0] for line in lines] for head, *lines in sections}
+    assert named["creatures"] == CREATURES
+    assert named["configurations"] == CONFIGS
+    assert set(TASKS) <= set(named["tasks"])
+    assert named["styles"] == STYLES
+    assert named["studies"] == STUDIES
+    assert {"controllers", "gaits", "grounds"} <= named.keys()
+    assert all(len(line.split()) > 1 for _, *lines in sections for line in lines)
+    assert said_by(capsys, "envs", code=0) == said
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_subcommand_has_its_example(name: str, capsys: pytest.CaptureFixture):
+    said = said_by(capsys, name, "--help", code=0)
+    assert f"Example: {COMMANDS[name].example}" in said
+    assert "NoneType" not in said
+    assert "{None}" not in said
+    if name == "train":
+        assert len(said.splitlines()) < 60
+        assert "--evolution.elite" not in said
 
 
 @pytest.mark.slow

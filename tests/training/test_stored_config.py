@@ -44,13 +44,12 @@ def test_settings_of_another_version_are_one_sentence(
     line: str, by: str, stool: Creature, tmp_path: Path
 ):
     run = create_run(tmp_path / "run", stool, Config())
-    first, *rest = (run / CONFIG).read_text(encoding="utf-8").splitlines()
-    for lost in ("variety = ", "hold = ", "promote = "):
-        rest = [text for text in rest if not text.startswith(lost)]
-    (run / CONFIG).write_text("\n".join([line, *rest]), encoding="utf-8")
+    without(run, "variety = 1\n")
+    _, _, rest = (run / CONFIG).read_text(encoding="utf-8").partition("\n")
+    (run / CONFIG).write_text(f"{line}\n{rest}", encoding="utf-8")
     with pytest.raises(UserError) as said:
         open_run(run)
-    assert f"{run}: made by {by}" in str(said.value)
+    assert f"{run / CONFIG}: made by {by}" in str(said.value)
     assert "train it anew" in str(said.value)
     assert len(str(said.value)) - len(str(run)) < 240
 
