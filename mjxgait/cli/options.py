@@ -22,8 +22,8 @@ from mjxgait.output import print_details
 
 T = TypeVar("T")
 HELP_ALL = "--help-all"
-BORDERS = "╭╮╰╯│─"
-"""Characters of the frame around tyro's errors."""
+SIDES, RULES = "│ ", set("─-╰╯")
+"""Characters of the frame around tyro's errors, in a UTF-8 terminal and in others."""
 ENDS = ("Argument helptext", "For full helptext")
 """Beginnings of what follows in such a frame and is left out."""
 SIMILAR = "Perhaps you meant"
@@ -82,18 +82,18 @@ def described(cls: type, command: str) -> str:
 
 
 def _sentence(framed: str) -> str:
-    """Return the error in tyro's frame as one sentence."""
+    """Return the error in tyro's frame, whose first line is a title, as one sentence."""
     lines: list[str] = []
     near: list[str] | None = None
-    for line in framed.splitlines():
-        text = line.strip(f"{BORDERS} ")
+    for line in framed.splitlines()[1:]:
+        text = line.strip(SIDES)
         if text.startswith(ENDS):
             break
         if text.startswith(SIMILAR):
             near = []
         elif near is not None:
-            near += [text.split()[0].rstrip(",")] if text.startswith("--") else []
-        elif text and not line.startswith("╭"):
+            near += [text.split()[0]] if text.startswith("--") and set(text) - RULES else []
+        elif set(text) - RULES:
             lines.append(text)
     said = " ".join(lines).rstrip(".").removeprefix("Error parsing ")
     return f"{said}; did you mean {' or '.join(near[:3])}?" if near else said

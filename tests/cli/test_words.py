@@ -7,6 +7,7 @@ import pytest
 from helpers import STOOL, said_by
 
 from mjxgait.cli import COMMANDS
+from mjxgait.cli.options import _sentence
 from mjxgait.cli.train_options import COMMON
 from mjxgait.config.layers import shipped_creatures
 
@@ -73,14 +74,31 @@ def test_a_mistake_is_one_sentence(typed: str, answer: str, capsys: pytest.Captu
     assert re.search(answer.replace("?", r"\?"), said), said
     assert len(said.splitlines()) == 1
     assert "NoneType" not in said
-    assert not set("╭│╰") & set(said)
+    assert not set("╭│╰─+") & set(said)
+
+
+@pytest.mark.parametrize("frame", ["╭╮│╰╯─", "     -"], ids=["unicode", "ascii"])
+def test_the_frame_of_an_error_is_taken_away(frame: str):
+    first, last, side, low, end, rule = frame
+    shown = f"""{first}{rule} Value error {rule * 4}{last}
+{side} Error parsing --x: 'abc': give a whole   {side}
+{side} number.                                  {side}
+{side} {rule * 40} {side}
+{side} Perhaps you meant:                       {side}
+{side}     --xx INT  of --other things          {side}
+{side} {rule * 40} {side}
+{side} Argument helptext:                       {side}
+{side}     --x INT                              {side}
+{low}{rule * 42}{end}
+"""
+    assert _sentence(shown) == "--x: 'abc': give a whole number; did you mean --xx?"
 
 
 def test_help_all_lists_every_key_and_help_the_common_options(capsys: pytest.CaptureFixture):
     said = said_by(capsys, "train", "--env", STOOL, "--help-all", code=0)
     assert "--evolution.elite" in said
     short = said_by(capsys, "train", "--help", code=0)
-    listed = re.findall(r"--([\w-]+)", short.partition("─ options ─")[2])
+    listed = re.findall(r"^[ │] +(?:-\w, )?--([\w-]+)", short, re.M)
     assert set(COMMON) | {"seed"} <= {name.replace("-", "_") for name in listed}
     assert all(f"--{name.replace('_', '-')}" in said for name in COMMON)
 
