@@ -1,5 +1,6 @@
 """`mjxgait completion`: a script that completes subcommands and options on Tab."""
 
+import contextlib
 import dataclasses
 import functools
 import importlib
@@ -32,7 +33,8 @@ def completion_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     options = parsed(CompletionOptions, "completion", arguments)
     commands: Any = functools.reduce(operator.or_, map(_subcommand, COMMANDS))
-    tyro.cli(commands, prog="mjxgait", args=["--tyro-print-completion", options.shell])
+    with contextlib.suppress(SystemExit):  # tyro ends the program after printing
+        tyro.cli(commands, prog="mjxgait", args=["--tyro-print-completion", options.shell])
     return 0
 
 

@@ -10,7 +10,7 @@ from mjxgait.processes import python_command, safe_environment
 
 OFF = ("disable", "disabled", "off", "false", "0")
 """Values of MUJOCO_GL for no GL."""
-PATIENCE = 10.0
+PATIENCE = 5.0
 """Longest time for a context, s."""
 
 

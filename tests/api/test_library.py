@@ -48,9 +48,9 @@ def records() -> list[logging.LogRecord]:
 def run(tmp_path_factory, lines: list[dict], records: list[logging.LogRecord]) -> mjxgait.Run:
     folder = tmp_path_factory.mktemp("runs") / "x"
     handler = logging.handlers.QueueHandler(SimpleNamespace(put_nowait=records.append))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(LOG, "handlers", [handler])
-        patch.setattr(LOG, "level", logging.DEBUG)
+    LOG.addHandler(handler)
+    LOG.setLevel(logging.DEBUG)
+    try:
         return mjxgait.train(
             STOOL,
             out=folder,
@@ -61,6 +61,9 @@ def run(tmp_path_factory, lines: list[dict], records: list[logging.LogRecord]) -
             quiet=True,
             on_generation=lines.append,
         )
+    finally:
+        LOG.removeHandler(handler)
+        LOG.setLevel(logging.NOTSET)
 
 
 def test_each_generation_is_passed_on_and_logged(

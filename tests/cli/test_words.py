@@ -1,5 +1,7 @@
 """Commands as a user types them: help, other names, a creature first, exit codes, errors."""
 
+import importlib
+import logging
 import re
 from pathlib import Path
 
@@ -7,9 +9,10 @@ import pytest
 from helpers import STOOL, said_by
 
 from mjxgait.cli import COMMANDS
-from mjxgait.cli.options import _sentence
+from mjxgait.cli.options import _sentence, parsed
 from mjxgait.cli.train_options import COMMON
 from mjxgait.config.layers import shipped_creatures
+from mjxgait.output import LOG, print_details
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "command-line.md"
 
@@ -131,3 +134,26 @@ def _missing() -> object:
 
 def test_a_creature_is_not_a_subcommand():
     assert not set(shipped_creatures()) & COMMANDS.keys()
+
+
+@pytest.mark.parametrize("name", ["train", "refine", "repertoire", "ablate"])
+@pytest.mark.parametrize("flag", ["", "-v", "--verbose"])
+def test_verbose_commands_print_details(name: str, flag: str, monkeypatch: pytest.MonkeyPatch):
+    printed: list[bool] = []
+    monkeypatch.setattr("mjxgait.cli.options.print_details", lambda: printed.append(True))
+    module = importlib.import_module(f"mjxgait.cli.{name}")
+    options = parsed(getattr(module, f"{name.capitalize()}Options"), name, flag.split())
+    assert (bool(printed), options.verbose, options.quiet) == (bool(flag), bool(flag), False)
+
+
+def test_details_are_printed_beside_the_progress(capsys: pytest.CaptureFixture):
+    before = LOG.handlers[:]
+    try:
+        print_details()
+        LOG.debug("evaluate: compiled")
+        LOG.info("Compiling…")
+    finally:
+        LOG.handlers[:] = before
+        LOG.setLevel(logging.NOTSET)
+    said = capsys.readouterr()
+    assert (said.out, said.err.split(" ", 1)[1]) == ("", "evaluate: compiled\n")

@@ -17,6 +17,7 @@ from mjxgait.creature import load_creature
 from mjxgait.training.folder import CERTIFICATE, open_run
 
 ELSEWHERE = {
+    "completion": "tests/end_to_end/test_commands.py::test_completion_knows_commands_and_options",
     "train": "tests/end_to_end/test_trainings.py::test_a_training_ends_with_a_certificate",
     "ablate": "tests/end_to_end/test_studies.py::test_a_study_ends_with_its_report",
     "view": "tests/web/test_live.py",
@@ -74,7 +75,6 @@ FORMS: dict[str, list[Made]] = {
     "list": [lambda folder: ([], "")],
     "doctor": [lambda folder: ([], "")],
     "cache": [lambda folder: ([], ""), lambda folder: (["show"], "")],
-    "completion": [lambda folder, shell=shell: ([shell], "") for shell in SHELLS],
 }
 EACH = [(name, number) for name, forms in FORMS.items() for number in range(len(forms))]
 
@@ -96,6 +96,13 @@ def test_every_subcommand_is_tested():
     for place in ELSEWHERE.values():
         file, _, test = place.partition("::")
         assert f"def {test}" in (ROOT / file).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_completion_knows_commands_and_options(shell: str, capsys: pytest.CaptureFixture):
+    said = said_by(capsys, "completion", shell, code=0)
+    assert all(name in said for name in COMMANDS)
+    assert "--evolve-body" in said
 
 
 def test_list_names_everything_that_ships(capsys: pytest.CaptureFixture):
