@@ -7,7 +7,7 @@ from pathlib import Path
 import tyro
 
 from mjxgait.api.studies import AblateRequest, finished, prepared
-from mjxgait.cli.options import Verbosity, parsed
+from mjxgait.cli.options import Verbosity, parsed, request_of
 from mjxgait.errors import INTERRUPTED
 from mjxgait.output import Output
 
@@ -30,9 +30,10 @@ class AblateOptions(Verbosity, AblateRequest):
 def ablate_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     options = parsed(AblateOptions, "ablate", arguments)
-    planned, output = prepared(options), Output(quiet=options.quiet)
+    request, output = request_of(AblateRequest, options), Output(quiet=options.quiet)
+    planned = prepared(request)
     if options.dry_run:
         output.console.print(planned.words)
         return 0
     output.say(planned.words)
-    return INTERRUPTED if finished(planned, options, output) is None else 0
+    return INTERRUPTED if finished(planned, request, output) is None else 0

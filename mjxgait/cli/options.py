@@ -74,6 +74,12 @@ def parsed(cls: type[T], command: str, arguments: Sequence[str], default: T | No
     return options
 
 
+def request_of(cls: type[T], options: object) -> T:
+    """Return the request that the Python function of a command takes, without further options."""
+    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+    return cls(**{field.name: getattr(options, field.name) for field in fields})
+
+
 def described(cls: type, command: str) -> str:
     """Return the text above a subcommand's options: the docstring without fields, an example."""
     text = (cls.__doc__ or "").partition("Attributes:")[0]

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from mjxgait.cli.options import parsed
+from mjxgait.cli.options import parsed, request_of
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +51,5 @@ def render_command(arguments: Sequence[str]) -> int:
     wanted = os.environ.pop("MUJOCO_GL", None)
     from mjxgait.api.films import Film, write_film
 
-    chosen = {field.name: getattr(options, field.name) for field in dataclasses.fields(Film)}
-    write_film(Film(**chosen), wanted, print)
+    write_film(request_of(Film, options), wanted, print)
     return 0

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from mjxgait.api.repertoires import RepertoireRequest, gather
-from mjxgait.cli.options import Verbosity, parsed
+from mjxgait.cli.options import Verbosity, parsed, request_of
 from mjxgait.errors import INTERRUPTED
 from mjxgait.output import Output
 
@@ -21,5 +21,5 @@ class RepertoireOptions(Verbosity, RepertoireRequest):
 def repertoire_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     options = parsed(RepertoireOptions, "repertoire", arguments)
-    _, ended = gather(options, Output(quiet=options.quiet))
+    _, ended = gather(request_of(RepertoireRequest, options), Output(quiet=options.quiet))
     return 0 if ended else INTERRUPTED
