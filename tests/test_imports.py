@@ -50,7 +50,7 @@ FLOORS = (
     ("creature/ground", "animation/clips"),
     ("types", "processes", "kinds"),
     ("cache",),
-    ("files", "lru", "output"),
+    ("files", "lru", "output", "extras"),
     ("errors",),
 )
 """Patterns of modules and packages, from the top down: each may import from its own or lower ones.

@@ -11,10 +11,10 @@ import numpy as np
 from mjxgait.certification import outdated, read_certificate, verdict_of
 from mjxgait.certification.verdict import Document
 from mjxgait.champion import Champion
-from mjxgait.config.layers import install_command
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,

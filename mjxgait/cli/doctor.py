@@ -14,7 +14,7 @@ from packaging.requirements import Requirement
 from mjxgait.cache import named_folder, own_folder, programs_in
 from mjxgait.cli.cache import in_words
 from mjxgait.cli.options import parsed
-from mjxgait.config.layers import install_command
+from mjxgait.extras import install_command
 from mjxgait.processes import cores
 from mjxgait.rendering.gl_probe import OFF, candidates, working
 

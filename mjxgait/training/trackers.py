@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from mjxgait.config.layers import install_command
 from mjxgait.config.tables import read_toml
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.training.folder import CONFIG, METRICS, Line, read_metrics
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import disk_errors

@@ -1,5 +1,6 @@
 """`mjxgait doctor` and `mjxgait cache`: each part is ok or has its remedy."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -107,3 +108,13 @@ def test_only_backends_that_make_a_context_work():
     assert candidates("glfw") == ["glfw"]
     assert working(["no_such_backend"]) == []
     assert doctor.renderer("off").remedy == ""
+
+
+def test_it_needs_no_mujoco():
+    """It says what is missing, so it must begin where that is missing."""
+    code = (
+        "import sys; sys.modules['mujoco'] = None; from mjxgait.cli import main; main(['doctor'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "Traceback" not in done.stderr
+    assert done.stdout.startswith("mjxgait")
