@@ -21,7 +21,7 @@ from typing import Any, cast
 from cluster import Nothing, gather, say
 from simulated import machines
 
-from mjxgait.cli.ablate import ROWS, STRIDE
+from mjxgait.api.studies import ROWS, STRIDE
 from mjxgait.distributed.connect import connected
 from mjxgait.distributed.jobs import Job, Recipe
 from mjxgait.distributed.scheduler import Report, Scheduler, Worker

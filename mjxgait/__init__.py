@@ -9,11 +9,15 @@ Give it a body and it returns a walk that holds up in physics, tested in a secon
 
     mjxgait.refine("duck", "walk.glb", keep=0.7).departure.words   # a hand-made cycle, made to walk
 
+    run = mjxgait.train("duck", quiet=True, on_generation=lambda line: print(line["best"]))
+    mjxgait.render(run, "walk.webp")      # also export, share, plot; `run` alone in a notebook
+    mjxgait.repertoire("duck"); mjxgait.ablate("forced_evolution")   # many runs
     mjxgait.walk(run)                     # columns for pandas: joints, feet, trunk over time
     mjxgait.examine(run)                  # the certificate again, criterion by criterion
     mjxgait.open("runs/x").metrics()      # fitness over generations
     mjxgait.frames(["runs/x", "runs/y"])  # the same of several runs, for pandas
     mjxgait.environment("duck")           # reset and step in JAX, for algorithms of your own
+    mjxgait.import_model("my_dog.urdf", "envs/my_dog")   # a creature folder
     mjxgait.load_creature("my_dog.xml")   # a body: shipped, a folder, MJCF or URDF
 
 On the command line: `mjxgait --help`.
@@ -24,12 +28,21 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mjxgait.api import (
         Run,
+        UserError,
+        ablate,
+        certify,
         environment,
         examine,
+        export,
         frames,
+        import_model,
         load_creature,
         open,
+        plot,
         refine,
+        render,
+        repertoire,
+        share,
         train,
         walk,
     )
@@ -37,12 +50,21 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = [
     "Run",
+    "UserError",
+    "ablate",
+    "certify",
     "environment",
     "examine",
+    "export",
     "frames",
+    "import_model",
     "load_creature",
     "open",
+    "plot",
     "refine",
+    "render",
+    "repertoire",
+    "share",
     "train",
     "walk",
 ]

@@ -10,9 +10,10 @@ Creatures of your own: `gymnasium.make("mjxgait/Creature-v0", creature="my_dog.x
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from mjxgait.config.layers import find_creature, install_command, shipped_creatures
+from mjxgait.config.layers import find_creature, shipped_creatures
 from mjxgait.config.tables import Table, read_toml
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.lru import LruCache
 
 try:

@@ -29,6 +29,7 @@ class ControllerKind:
     serializer: a `Serializer`; None writes the genome's arrays as they are.
     report: a `GenomeView`; None shows the arrays as they are.
     grows: whether a genome grows its own body.
+    what: what it is, in a few words.
     """
 
     name: str
@@ -38,6 +39,7 @@ class ControllerKind:
     serializer: Part = None
     report: Part = None
     grows: bool = False
+    what: str = ""
 
     def part(self, name: str) -> Any:
         """Return one of the parts, imported if necessary."""
@@ -57,6 +59,7 @@ class TaskKind:
     called: the user's name for the task; one name may mean one task for a body from a model and
       another for one that grows.
     tables: tables of the certificate's settings that apply only to this task or related ones.
+    what: what the creature is to do, in a few words.
     """
 
     name: str
@@ -67,6 +70,7 @@ class TaskKind:
     water: bool = False
     called: str = ""
     tables: tuple[str, ...] = ()
+    what: str = ""
 
     def part(self, name: str) -> Any:
         """Return one of the parts, imported if necessary."""

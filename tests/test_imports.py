@@ -49,7 +49,8 @@ FLOORS = (
     ("config", "controllers/*/config", "tasks/*/*config", "tasks/walk/gaits"),
     ("creature/ground", "animation/clips"),
     ("types", "processes", "kinds"),
-    ("files", "lru"),
+    ("cache",),
+    ("files", "lru", "output", "extras"),
     ("errors",),
 )
 """Patterns of modules and packages, from the top down: each may import from its own or lower ones.

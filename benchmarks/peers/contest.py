@@ -17,8 +17,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mjxgait.config.layers import install_command
 from mjxgait.config.schema import Config
+from mjxgait.extras import install_command
 from mjxgait.processes import cores
 from peers.c_peer import CPeer, NoCompiler, Workers, build
 from peers.machine import distance_to_limit, machine_facts, measured_peak, step_cost

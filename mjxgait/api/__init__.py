@@ -7,27 +7,35 @@ run.champion, run.certificate, run.metrics()
 mjxgait.walk(run)["trunk_z"]
 """
 
+from mjxgait.api.bodies import import_model
 from mjxgait.api.environments import environment
-from mjxgait.api.make import (
-    examine,
-    examine_expressions,
-    load_creature,
-    refine,
-    train,
-    verify,
-    walk,
-)
+from mjxgait.api.examining import certify, examine, examine_expressions, verify, walk
+from mjxgait.api.exports import export, plot, share
+from mjxgait.api.films import render
+from mjxgait.api.make import load_creature, refine, train
+from mjxgait.api.repertoires import repertoire
 from mjxgait.api.run import Run, frames, open
+from mjxgait.api.studies import ablate
+from mjxgait.errors import UserError
 
 __all__ = [
     "Run",
+    "UserError",
+    "ablate",
+    "certify",
     "environment",
     "examine",
     "examine_expressions",
+    "export",
     "frames",
+    "import_model",
     "load_creature",
     "open",
+    "plot",
     "refine",
+    "render",
+    "repertoire",
+    "share",
     "train",
     "verify",
     "walk",

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mjxgait.api.run import Place, Run, open
-from mjxgait.certification import Certificate, CertificateConfig, certify
-from mjxgait.certification.validity import differences
+from mjxgait.api.run import Place, Run
 from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import Table, build, merge, read_toml
@@ -18,11 +16,13 @@ from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
 from mjxgait.creature.scale import at_step, facing, load_files, scaled
 from mjxgait.errors import UserError
-from mjxgait.training.examination import Exams
-from mjxgait.training.folder import CERTIFICATE, EXAMS, check_run, command, create_run
+from mjxgait.training.folder import Line, check_run, create_run
 
 if TYPE_CHECKING:
     from mjxgait.training.screen import Screen
+
+OnGeneration = Callable[[Line], object]
+"""Called with the line of a generation in `metrics.jsonl`."""
 
 
 def load_creature(
@@ -75,6 +75,7 @@ def train(
     generations: int | None = None,
     settings: Table | None = None,
     quiet: bool = False,
+    on_generation: OnGeneration | None = None,
 ) -> Run:
     """Evolve a creature, examine its champion, and return the run.
 
@@ -101,7 +102,10 @@ def train(
       population: individuals of a generation.
       generations: the most that are evolved.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
-      quiet: prints nothing.
+      quiet: prints nothing; the logger "mjxgait" gets the progress (level INFO).
+      on_generation: called after each generation with its line of `metrics.jsonl`, a dict with
+        `generation`, `best`, `mean` and more. What it raises ends the run; `mjxgait train --resume`
+        goes on.
 
     Raises:
       UserError: an invalid argument, explained in one sentence.
@@ -130,7 +134,8 @@ def train(
         chosen = with_expressions(creature, chosen, Path(expressions))
     folder = check_run(Path(out) if out else None, creature, chosen)
     begin = partial(create_run, folder, creature, chosen)
-    return _evolved(folder, creature, chosen, quiet, begin, Path(source) if source else None)
+    initial = Path(source) if source else None
+    return _evolved(folder, creature, chosen, quiet, begin, initial, on_generation)
 
 
 def refine(
@@ -150,6 +155,7 @@ def refine(
     generations: int | None = None,
     settings: Table | None = None,
     quiet: bool = False,
+    on_generation: OnGeneration | None = None,
 ) -> Run:
     """Evolve a walk near a hand-made or captured cycle, and return the run (docs/guide/refine.md).
 
@@ -173,6 +179,7 @@ def refine(
       generations: as for `train`.
       settings: as for `train`.
       quiet: as for `train`.
+      on_generation: as for `train`.
 
     Raises:
       UserError: an invalid argument or file, explained in one sentence.
@@ -190,7 +197,7 @@ def refine(
     chosen = near.refining(base, brought, keep)
     folder = check_run(Path(out) if out else None, creature, chosen)
     begins = partial(near.begin, folder, creature, chosen, source, brought)
-    return _evolved(folder, creature, chosen, quiet, begins)
+    return _evolved(folder, creature, chosen, quiet, begins, on_generation=on_generation)
 
 
 def _evolved(
@@ -200,6 +207,7 @@ def _evolved(
     quiet: bool,
     begin: Callable[[], object],
     source: Path | None = None,
+    on_generation: OnGeneration | None = None,
 ) -> Run:
     """Evolve and examine a run in a new folder; return it.
 
@@ -211,7 +219,8 @@ def _evolved(
     from mjxgait.training.stages import prepare_devices
 
     prepare_devices()
-    screen = Screen(Console(quiet=True)) if quiet else Screen()
+    listeners = (on_generation,) if on_generation else ()
+    screen = Screen(Console(quiet=True) if quiet else None, listeners=listeners)
     evolve(folder, creature, config, screen, begin=begin, source=source)
     return Run(folder)
 
@@ -258,100 +267,3 @@ def used(**named: str | None) -> dict[str, str]:
     from mjxgait.plugins.user_code import load
 
     return {kind: load(kind, text) for kind, text in given.items()}
-
-
-def examine(run: Run | Place, config: Place | None = None) -> Certificate:
-    """Examine the champion of a run in C MuJoCo, criterion by criterion; write nothing.
-
-    Args:
-      config: TOML file with other thresholds (configs/certificate/default.toml lists all).
-
-    Raises:
-      UserError: no run, no champion, or an invalid file.
-    """
-    known = run if isinstance(run, Run) else open(run)
-    table = read_toml(Path(config)) if config else {}
-    champion = known.champion
-    attempt = Exams(known.folder / EXAMS).attempt(
-        champion.fingerprint, int(champion.origin.get("generation", 0))
-    )
-    return certify(
-        known.creature, champion, build(CertificateConfig, table, str(config)), attempts=attempt
-    )
-
-
-def verify(run: Run | Place) -> list[str]:
-    """Return the differences between a second examination of a champion and its certificate.
-
-    One phrase each; empty if all measures are equal (`certification.verify.TOLERANCE`). The second
-    examination uses the thresholds of the certificate. Writes nothing.
-
-    Raises:
-      UserError: no run, no champion, no certificate, or thresholds of another version.
-    """
-    known = run if isinstance(run, Run) else open(run)
-    stored, path = known.certificate, known.folder / CERTIFICATE
-    if stored is None:
-        raise UserError(
-            f"{path}: not there; {command('certify', known.folder, run=known.folder)} examines the champion"
-        )
-    config = build(CertificateConfig, stored.get("config", {}), str(path))
-    return differences(stored, certify(known.creature, known.champion, config).document())
-
-
-def examine_expressions(
-    env: Place, file: Place, task: str | None = None, config: Place | None = None
-) -> Certificate:
-    """Examine a program that was written by hand (docs/reference/expressions.md); write nothing.
-
-    Args:
-      env: shipped creature, creature folder, or model file; its own settings set how often the
-        expressions are evaluated and how the drive follows. file: contains one program. task: by
-        default the creature's usual task. config: as for `examine`.
-
-    Raises:
-      UserError: a mistake, with its file and line.
-    """
-    from mjxgait.controllers.expressions.written import written_champion
-    from mjxgait.plugins.fit import check_fit
-    from mjxgait.tasks.walk.targets import WalkTargets, configured
-
-    table = read_toml(Path(config)) if config else {}
-    thresholds = build(CertificateConfig, table, str(config))
-    use = {"controller": "program"} | ({"task": task} if task else {})
-    creature = load_creature(env)
-    settings = configured(creature, None, use, WalkTargets())
-    check_fit(creature, settings)
-    creature = at_step(creature, settings.rollout.step).on(settings.rollout.ground)
-    return certify(creature, written_champion(creature, settings, Path(file)), thresholds)
-
-
-def walk(run: Run | Place, seconds: float = 12.0) -> dict[str, np.ndarray]:
-    """Return the champion's undisturbed motion in C MuJoCo as columns [T], for pandas or a plot.
-
-    `time` s; `trunk_x`, `trunk_y`, `trunk_z` m, forward, left and up from the start; `pitch`,
-    `roll` rad; per joint `pos_NAME` rad, `vel_NAME` rad/s, `torque_NAME` N·m; per foot
-    `height_NAME` m, `force_NAME` N. The motion ends soon after a fall.
-
-    Raises:
-      UserError: no run or no champion.
-    """
-    from mjxgait.rendering.walk import record_walk
-
-    known = run if isinstance(run, Run) else open(run)
-    if not seconds > 0:
-        raise UserError(f"seconds = {seconds}: must be more than zero")
-    creature = known.creature
-    seen = record_walk(creature, known.champion, seconds).recording
-    columns = {"time": np.arange(len(seen.pitch)) * seen.time_step}
-    columns |= {f"trunk_{axis}": seen.trunk_pos[:, i] for i, axis in enumerate("xyz")}
-    columns |= {"pitch": seen.pitch, "roll": seen.roll}
-    joints = {"pos": seen.joint_pos, "vel": seen.joint_vel, "torque": seen.torque}
-    feet = {"height": seen.foot_height, "force": seen.foot_force}
-    for names, values in ((creature.joints.names, joints), (creature.feet.names, feet)):
-        columns |= {
-            f"{what}_{name}": array[:, i]
-            for what, array in values.items()
-            for i, name in enumerate(names)
-        }
-    return columns

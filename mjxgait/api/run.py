@@ -1,6 +1,7 @@
 """A run folder as an object."""
 
 import dataclasses
+import html
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,10 +11,10 @@ import numpy as np
 from mjxgait.certification import outdated, read_certificate, verdict_of
 from mjxgait.certification.verdict import Document
 from mjxgait.champion import Champion
-from mjxgait.config.layers import install_command
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
@@ -98,6 +99,18 @@ class Run:
             name: np.array([np.nan if line.get(name) is None else line[name] for line in lines])
             for name in names
         }
+
+    def _repr_html_(self) -> str:
+        """Show the result and the walk in a notebook."""
+        place = f"<code>{html.escape(str(self.folder))}</code>"
+        if not (self.folder / CHAMPION).exists():
+            return f"<p>{place}: no champion yet</p>"
+        from mjxgait.rendering.notebook import walk_image
+
+        verdict = "certified" if self.certified else "not certified"
+        words = f"{html.escape(self.creature.name)}, {verdict}"
+        fitness = f"fitness {self.champion.fitness:.3f}"
+        return f"<p>{place}: {words}, {fitness}</p>{walk_image(self.folder)}"
 
     def frame(self) -> "pandas.DataFrame":
         """Return `metrics.jsonl` as a table, a row per generation; without `mothers`.

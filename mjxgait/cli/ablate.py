@@ -1,255 +1,39 @@
 """`mjxgait ablate`: compare variants of the settings over seeds, with error bars."""
 
 import dataclasses
-import shlex
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import tyro
 
-from mjxgait.config.layers import find_creature
-from mjxgait.config.schema import Physics
-from mjxgait.config.tables import (
-    build,
-    check_whole,
-    dump_toml,
-    read_toml,
-)
-from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.scale import at_step
-from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.files import write_text, writing
-from mjxgait.training.folder import CREATURE, is_taken
-from mjxgait.training.stored import locked
-
-if TYPE_CHECKING:
-    from mjxgait.experiments.ablation.plan import Plan, Study
-    from mjxgait.experiments.ablation.rows import News
-
-STUDY = "study.toml"
-OVER = ("env", "seeds", "first_seed", "generations", "config", "rows", "physics")
-"""Options that override the keys of the same name in the study."""
-ROWS, STRIDE = 4, 5
-"""Runs and generations of a job on a cluster."""
-EXPECTED_SPEED = 0.8e6
-"""Creature-steps per second on two cores; only for the estimate."""
+from mjxgait.api.studies import AblateRequest, finished, prepared
+from mjxgait.cli.options import Verbosity, parsed, request_of
+from mjxgait.errors import INTERRUPTED
+from mjxgait.output import Output
 
 
 @dataclasses.dataclass(frozen=True)
-class AblateOptions:
+class AblateOptions(Verbosity, AblateRequest):
     """Run a study, variants times seeds side by side, with a report (docs/research/ablations.md).
 
     Writes report.md, report.html, results.csv and generations.parquet into the study folder.
 
     Attributes:
       study: File of a study, or the name of a shipped one; not needed with --resume.
-      out: Folder for the study; by default one under runs/.
-      env: Creature, instead of the study's.
-      seeds: Number of seeds, instead of the study's.
-      first_seed: First seed, instead of the study's.
-      generations: Number of generations, instead of the study's; variants with their own number
-        keep their share of evaluations.
-      config: Base config, instead of the study's: a TOML file, or the name of a shipped one.
-      rows: Runs side by side in one program; by default all, on a cluster 4.
-      physics: mjx simulates all runs with MJX itself instead of this program's faster step.
-      cluster: Evolve on a Ray cluster: HOST:PORT, or auto for the cluster that this machine belongs
-        to (docs/guide/cluster.md).
-      resume: Folder of a study to continue unchanged.
-      hours: Refuse a study that may take longer.
       dry_run: Only print the planned runs and the estimated time.
     """
 
     study: tyro.conf.Positional[Path | None] = None
-    out: Path | None = None
-    env: str | None = None
-    seeds: int | None = None
-    first_seed: int | None = None
-    generations: int | None = None
-    config: str | None = None
-    rows: int | None = None
-    physics: Physics | None = None
-    cluster: str | None = None
-    resume: Path | None = None
-    hours: float = 12.0
     dry_run: bool = False
 
 
 def ablate_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(AblateOptions, args=list(arguments), prog="mjxgait ablate")
-    from mjxgait.experiments.ablation.plan import check_variants, make_plan, read_study
-    from mjxgait.experiments.ablation.report import write_report
-    from mjxgait.experiments.ablation.rows import measure, read_logs
-
-    folder = (
-        options.resume
-        or options.out
-        or Path("runs") / f"ablate-{options.study.stem if options.study else ''}"
-    )
-    if options.resume:
-        study, creature = _open(folder)
-    else:
-        if options.study is None:
-            raise UserError(
-                "name the file of a study, such as: mjxgait ablate forced_evolution --out "
-                "runs/forced"
-            )
-        over = {name: getattr(options, name) for name in OVER}
-        study = read_study(options.study, over)
-        if options.cluster and not study.rows:
-            study = dataclasses.replace(study, rows=ROWS)
-        creature = load_creature(find_creature(study.env))
-    where = str(options.study or folder / STUDY)
-    plan = make_plan(study, creature, where)
-    creature = at_step(creature, plan.runs[0].config.rollout.step)
-    if not options.resume:
-        check_variants(plan, creature, where)
-    # JAX takes a second to import, so the study is checked first.
-    from mjxgait.experiments.ablation.rows import groups
-    from mjxgait.training.spec import check_spec
-    from mjxgait.training.stages import prepare_devices
-
-    prepare_devices()
-    hours = _hours(plan.upper_bound(creature), len(parts := groups(plan)))
-    print(
-        f"{len(plan.variants)} variants × {study.seeds} seeds = {len(plan.runs)} runs in "
-        f"{len(parts)} program{'s' if len(parts) > 1 else ''}; at most "
-        f"{plan.upper_bound(creature) / 1e6:.0f} M creature-steps, about {_duration(3600 * hours)} "
-        "at most on two cores"
-    )
-    if hours > options.hours:
-        raise UserError(
-            f"this study may take {hours:.0f} hours; take fewer --seeds or --generations, or allow "
-            f"it with --hours {hours:.0f}"
-        )
+    options = parsed(AblateOptions, "ablate", arguments)
+    request, output = request_of(AblateRequest, options), Output(quiet=options.quiet)
+    planned = prepared(request)
     if options.dry_run:
+        output.console.print(planned.words)
         return 0
-    screen, begin = _Progress(), None
-    if not options.resume:
-        _check_new(folder)
-        for runs in parts:
-            check_spec(creature, runs[0].config)
-        begin = partial(_create, folder, study, creature)
-    if not _run(folder, creature, plan, screen, options.cluster, begin):
-        print(f"interrupted; go on with: mjxgait ablate --resume {folder}")
-        return INTERRUPTED
-    results = measure(folder, plan, screen.measuring)
-    command = shlex.join(["mjxgait", "ablate", *_repeatable(options)])
-    report = write_report(folder, plan, results, read_logs(folder), command)
-    print(report.read_text(encoding="utf-8"))
-    print(f"report        {report}, {report.with_suffix('.html')}")
-    return 0
-
-
-def _run(
-    folder: Path,
-    creature: Creature,
-    plan: "Plan",
-    screen: "_Progress",
-    cluster: str | None,
-    begin: Callable[[], object] | None,
-) -> bool:
-    """Run a study on this machine or on a cluster; return False if interrupted.
-
-    begin: makes the folder of a new study; called after the last check.
-    """
-    from mjxgait.distributed.evolve import scheduler_at
-    from mjxgait.experiments.ablation.rows import run_study
-
-    tell, stride = (screen.part, STRIDE) if cluster else (screen.generation, 1)
-    with scheduler_at(cluster) as scheduler:
-        if begin is not None:
-            begin()
-        with locked(folder):
-            return run_study(folder, creature, plan, tell, scheduler, stride)
-
-
-class _Progress:
-    """Progress as plain lines; the time left is estimated from the generations so far."""
-
-    def part(self, group: int, count: int, news: "News") -> None:
-        """Report on one program of a study on a cluster, where several run at once."""
-        if "compiling" in news:
-            return
-        print(
-            f"rows {group + 1} of {count}: generation {news['generation']} of {news['of']}, "
-            f"{news['steps'] / max(news['seconds'], 1e-9) / 1e6:.2f} M steps/s",
-            flush=True,
-        )
-
-    def generation(self, group: int, count: int, news: "News") -> None:
-        where = f"program {group + 1} of {count}" if count > 1 else "all runs"
-        if "compiling" in news:
-            print(f"{where}: compiling for {news['compiling']} runs side by side", flush=True)
-            return
-        if news["note"] and not news["generation"]:
-            print(news["note"], flush=True)
-        left = (news["of"] - news["generation"]) * news["seconds"] / max(news["generations"], 1)
-        speed = news["steps"] / news["seconds"] / 1e6
-        print(
-            f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, "
-            f"{_duration(left)} left",
-            flush=True,
-        )
-
-    def measuring(self, number: int, count: int) -> None:
-        print(f"{number} of {count} champions examined in C MuJoCo", flush=True)
-
-
-def _check_new(folder: Path) -> None:
-    """Refuse a folder that is not empty."""
-    if is_taken(folder):
-        raise UserError(
-            f"{folder}: holds something already; name another folder with --out, or go on with "
-            f"--resume {folder}"
-        )
-
-
-def _create(folder: Path, study: "Study", creature: Creature) -> None:
-    """Make the folder of a study, with its exact settings and creature."""
-    with writing(folder):
-        (folder / CREATURE).mkdir(parents=True, exist_ok=True)
-        for name, text in creature.files.items():
-            write_text(folder / CREATURE / name, text)
-        write_text(folder / STUDY, dump_toml(study))
-
-
-def _open(folder: Path) -> tuple["Study", Creature]:
-    from mjxgait.experiments.ablation.plan import Study
-
-    if not (folder / STUDY).is_file():
-        raise UserError(f"{folder}: not the folder of a study (it has no {STUDY})")
-    table = read_toml(folder / STUDY)
-    study = build(Study, table, str(folder / STUDY))
-    check_whole(study, table, str(folder / STUDY))
-    return study, load_creature(folder / CREATURE)
-
-
-def _repeatable(options: AblateOptions) -> list[str]:
-    """Return the options that decide the results, without folders.
-
-    The report must not depend on where it is made.
-    """
-    if options.resume:
-        return ["study.toml"]
-    parts = [str(options.study)]
-    for name in OVER:
-        if getattr(options, name) is not None:
-            parts += [f"--{name.replace('_', '-')}", str(getattr(options, name))]
-    return parts
-
-
-def _hours(steps: int, programs: int) -> float:
-    return (steps / EXPECTED_SPEED + 20 * programs) / 3600
-
-
-def _duration(seconds: float) -> str:
-    return (
-        f"{seconds / 3600:.1f} h"
-        if seconds > 5400
-        else f"{seconds / 60:.0f} min"
-        if seconds > 90
-        else f"{seconds:.0f} s"
-    )
+    output.say(planned.words)
+    return INTERRUPTED if finished(planned, request, output) is None else 0

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import tyro
 
-from mjxgait.api import examine, examine_expressions
+from mjxgait.api import certify, examine_expressions
+from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
 from mjxgait.files import write_text
-from mjxgait.training.folder import CERTIFICATE
 from mjxgait.training.stored import disk_errors, require_writable
 
 
@@ -47,7 +47,7 @@ class CertifyOptions:
 
 def certify_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(CertifyOptions, args=list(arguments), prog="mjxgait certify")
+    options = parsed(CertifyOptions, "certify", arguments)
     if options.expressions is not None:
         return _certify_expressions(options, options.expressions)
     if options.run is None or options.env or options.out:
@@ -55,12 +55,9 @@ def certify_command(arguments: Sequence[str]) -> int:
             "name the run to examine: mjxgait certify RUN; --env and --out are for a program: "
             "mjxgait certify --env luxo --expressions FILE"
         )
-    certificate = examine(options.run, options.config)
+    certificate = certify(options.run, options.config)
     from mjxgait.training.screen import Screen  # rich is slow to import
 
-    path = options.run / CERTIFICATE
-    with disk_errors(path, "what was there before is as it was", "examine it again"):
-        write_text(path, certificate.to_json())
     Screen().certificate(certificate)
     return 0
 

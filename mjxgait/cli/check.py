@@ -7,6 +7,7 @@ from pathlib import Path
 import tyro
 
 from mjxgait.certification.check_body import check_body
+from mjxgait.cli.options import parsed
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
@@ -32,7 +33,7 @@ class CheckOptions:
 
 def check_command(arguments: Sequence[str]) -> int:
     """Return the exit code: 1 for a creature that is valid but does not stand."""
-    options = tyro.cli(CheckOptions, args=list(arguments), prog="mjxgait check")
+    options = parsed(CheckOptions, "check", arguments)
     folder = Path(options.env)
     creature = load_creature(folder if folder.is_dir() else find_creature(options.env))
     configured(creature, None, {}, WalkTargets())

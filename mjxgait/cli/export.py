@@ -3,18 +3,11 @@
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import tyro
 
-from mjxgait.errors import UserError
-
-if TYPE_CHECKING:
-    from mjxgait.animation.export import Character, WalkLoop
-    from mjxgait.rendering.walk import Walk
-
-KINDS = (".glb", ".bvh", ".usda", ".usdc", ".csv", ".json")
-NUMBERS = (".csv", ".json")
+from mjxgait.cli.options import parsed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,61 +36,15 @@ class ExportOptions:
 
 def export_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(ExportOptions, args=list(arguments), prog="mjxgait export")
-    from mjxgait.animation.export import read_character, walk_loop
-    from mjxgait.rendering.video import LOOP_SECONDS, champion_of
-    from mjxgait.rendering.walk import doubt
-    from mjxgait.training.stored import require_writable
+    options = parsed(ExportOptions, "export", arguments)
+    from mjxgait.api.exports import export
 
-    _check_names(options.out, options.onto)
-    require_writable(options.out)
-    character = None if options.onto is None else read_character(options.onto)
-    walk = champion_of(options.run, LOOP_SECONDS).walk
-    said = (
-        _numbers(walk, options.out)
-        if options.out.suffix.lower() in NUMBERS
-        else _animation(walk_loop(walk, options.rate), character, options.out, options.travelling)
+    export(
+        options.run,
+        options.out,
+        onto=options.onto,
+        rate=options.rate,
+        travelling=options.travelling,
+        tell=print,
     )
-    print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB): {said}")
-    if said := doubt(options.run, walk):
-        print(said)
     return 0
-
-
-def _numbers(walk: "Walk", out: Path) -> str:
-    """Write the walk as numbers; return what was written."""
-    from mjxgait.animation.export.motion import export_motion
-
-    export_motion(walk, out)
-    return f"{walk.seconds:.2f} s at {1 / walk.time_step:.0f} Hz"
-
-
-def _animation(loop: "WalkLoop", character: "Character | None", out: Path, travelling: bool) -> str:
-    """Write the loop; return what was written."""
-    called = _write(loop, character, out, travelling)
-    strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
-    seconds, rate, speed = loop.times[-1], loop.rate, loop.speed
-    return f"{called}{strides}, {seconds:.2f} s at {rate} frames/s, {speed:.2f} m/s"
-
-
-def _check_names(out: Path, onto: Path | None) -> None:
-    """Refuse a kind of file that is not written, and to write over the character."""
-    if (kind := out.suffix.lower()) not in KINDS:
-        raise UserError(f'{out}: cannot write "{out.suffix}"; end the name with {", ".join(KINDS)}')
-    if onto is None:
-        return
-    if kind != ".glb":
-        raise UserError(f"{out}: with --onto a character is written; end the name with .glb")
-    if out.exists() and onto.exists() and out.samefile(onto):
-        raise UserError(f"{out}: is your character, which stays; name another file with --out")
-
-
-def _write(loop: "WalkLoop", character: "Character | None", out: Path, travelling: bool) -> str:
-    """Write the file; return words about the animation on a character."""
-    from mjxgait.animation.export import export_bvh, export_glb, export_onto, export_usd
-
-    if character is not None:
-        return f'animation "{export_onto(loop, character, out, travelling)}", '
-    writers = {".glb": export_glb, ".bvh": export_bvh}
-    writers.get(out.suffix.lower(), export_usd)(loop, out, travelling)
-    return ""

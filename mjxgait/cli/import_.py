@@ -8,16 +8,10 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
-from mjxgait.creature.scale import load_files
+from mjxgait.api.bodies import into_folder
+from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
-from mjxgait.files import write_text, writing
-from mjxgait.importer import (
-    TOML,
-    WRITTEN,
-    ImportChoices,
-    Imported,
-    import_model,
-)
+from mjxgait.importer import ImportChoices
 from mjxgait.importer.worker import GIGABYTES, SECONDS
 
 Words = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
@@ -62,7 +56,7 @@ class ImportOptions:
 
 def import_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(ImportOptions, args=list(arguments), prog="mjxgait import")
+    options = parsed(ImportOptions, "import", arguments)
     choices = ImportChoices(
         options.name,
         tuple(map(Path, options.search)),
@@ -76,9 +70,7 @@ def import_command(arguments: Sequence[str]) -> int:
     )
     if not (0 < options.seconds < np.inf and 0 < options.gigabytes < np.inf):
         raise UserError("--seconds and --gigabytes: give numbers above zero")
-    check_folder(options.out, choices.search, options.model, options.force)
-    imported = import_model(options.model, choices)
-    write_folder(options.out, imported)
+    imported = into_folder(options.model, options.out, choices, options.force)
     print(imported.notes.text())
     print(f"wrote {options.out}; look at it with: mjxgait check {options.out}")
     if not imported.stands:
@@ -87,43 +79,3 @@ def import_command(arguments: Sequence[str]) -> int:
             "creature.xml."
         )
     return 0
-
-
-def check_folder(folder: Path, read: Sequence[Path], model: Path, force: bool) -> None:
-    """Check, before the slow import, that a creature may be written to the folder.
-
-    Args:
-      read: folders that the import reads besides the model's own. force: overwrite a creature.
-
-    Raises:
-      UserError: the import reads from the folder, or it contains other things than a creature, or
-        a creature without `force`.
-    """
-    if folder.resolve() in {place.resolve() for place in (model.parent, *read)}:
-        raise UserError(
-            f"{folder}: the import reads from this folder, so it writes nothing there; name another "
-            "with --out"
-        )
-    if not folder.exists():
-        return
-    names = {file.name for file in folder.iterdir()} if folder.is_dir() else {"a file"}
-    if names - {*WRITTEN} or (names and TOML not in names):
-        raise UserError(f"{folder}: holds something else; name another folder with --out")
-    if names and not force:
-        raise UserError(
-            f"{folder}: holds a creature already, maybe edited by hand; name another folder with "
-            "--out, or write over it with --force"
-        )
-
-
-def write_folder(folder: Path, imported: Imported) -> None:
-    """Write the creature folder, after checking that its texts load.
-
-    Raises:
-      UserError: the texts are not a creature, or the folder cannot be written.
-    """
-    load_files(imported.files)
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in imported.files.items():
-            write_text(folder / name, text)

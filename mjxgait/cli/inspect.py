@@ -12,6 +12,7 @@ from typing import TypedDict, TypeVar
 import tyro
 from rich.console import Console
 
+from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
 
 PIPED_WIDTH = 160
@@ -52,7 +53,7 @@ class InspectOptions:
 
 def inspect_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(InspectOptions, args=list(arguments), prog="mjxgait inspect")
+    options = parsed(InspectOptions, "inspect", arguments)
     # Reading needs no accelerator, and a broken one must not prevent it. Must precede the import of
     # JAX.
     os.environ.setdefault("JAX_PLATFORMS", "cpu")

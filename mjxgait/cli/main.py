@@ -7,38 +7,15 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
+from mjxgait.cli.commands import ALIASES, COMMANDS, MOVED
 from mjxgait.errors import (
     INTERRUPTED,
     NotLoaded,
     UserError,
     did_you_mean,
 )
-
-COMMANDS = {
-    "train": "evolve a walk: mjxgait train --env tall_quadruped",
-    "refine": "make a hand-made cycle walk: mjxgait refine --env duck --keys walk.glb",
-    "certify": "examine a champion in C MuJoCo: mjxgait certify RUN",
-    "stress": "test a walk on bumps and slopes, by pushes, for ten minutes: mjxgait stress RUN",
-    "inspect": "show what a run or a checkpoint holds: mjxgait inspect RUN",
-    "plot": "draw a run: fitness, footfalls, joints, a filmstrip: mjxgait plot RUN",
-    "render": "make a video of a walk or a race: mjxgait render RUN --out walk.webp",
-    "export": "write a walk as an animation file: mjxgait export RUN --out walk.glb",
-    "share": "write one offline page of a walk in 3D: mjxgait share RUN --out walk.html",
-    "repertoire": "evolve a grid of walks that blend, for games: mjxgait repertoire --env duck",
-    "view": "watch a run as it learns on a local page: mjxgait view RUN",
-    "import": "make a creature folder from a model file: mjxgait import robot.urdf --out envs/mine",
-    "check": "validate a creature folder and draw it: mjxgait check envs/mine",
-    "ablate": "compare settings over seeds, with error bars: mjxgait ablate forced_evolution --out "
-    "DIR",
-    "envs": "list the shipped creatures and configs",
-}
-"""Each is `<name>_command` in mjxgait/cli/<name>.py (`import` in import_.py), imported only when it
-is called.
-"""
-
-MOVED = {"bench": "python benchmarks/speed.py measures the speed, in a checkout of the repository"}
-"""What does the work of subcommands that are gone."""
 
 OWN_PARTS = ("--controller", "--task")
 """Options of every subcommand that name user-defined code."""
@@ -50,6 +27,11 @@ Evolve a stable walk for any creature.
 {commands}
 
 `mjxgait SUBCOMMAND --help` lists the options of each; `mjxgait --version` says which this is."""
+
+
+def _usage() -> str:
+    lines = (f"  {name:10} {one.what}: {one.example}" for name, one in COMMANDS.items())
+    return USAGE.format(commands="\n".join(lines))
 
 
 def _with_own_parts(given: Sequence[str]) -> list[str]:
@@ -82,28 +64,67 @@ def _without_own_parts(given: Sequence[str]) -> list[str]:
     return rest
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the console command. Exit codes: 0 done, 2 invalid arguments, 130 interrupted."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    if not given or given[0] in ("-h", "--help"):
-        print(
-            USAGE.format(
-                commands="\n".join(f"  {name:10} {what}" for name, what in COMMANDS.items())
+def _meant(given: Sequence[str]) -> list[str]:
+    """Return a command as the program reads it: asking for help, other names, a creature first.
+
+    Raises:
+      UserError: the creature is named twice.
+    """
+    if given[0] == "help":
+        return [*(given[1:2] if given[1:2] != ["help"] else []), "--help"]
+    command, *rest = ALIASES.get(given[0], given[0]), *given[1:]
+    if rest == ["help"] and not Path("help").exists():
+        return [command, "--help"]
+    if command in COMMANDS and COMMANDS[command].creature and rest and not rest[0].startswith("-"):
+        if any(word.partition("=")[0] == "--env" for word in rest):
+            raise UserError(
+                f"the creature is named twice, {rest[0]} and with --env; name it once: "
+                f"mjxgait {command} {rest[0]}"
             )
-        )
-        sys.exit(0 if given else 2)
-    if given[0] in ("-V", "--version"):
-        print(f"mjxgait {importlib.metadata.version('mjxgait')}")
-        sys.exit(0)
+        rest = ["--env", *rest]
+    return [command, *rest]
+
+
+def _run(given: Sequence[str]) -> int:
+    """Run a subcommand; return its exit code.
+
+    Raises:
+      UserError: there is none of this name, or it refuses its input.
+    """
+    name = given[0]
+    if name in MOVED:
+        raise UserError(MOVED[name])
+    if name not in COMMANDS:
+        raise UserError(_unknown(name))
+    module = importlib.import_module(f"mjxgait.cli.{name + '_' * keyword.iskeyword(name)}")
+    code: int = getattr(module, f"{name}_command")(_with_own_parts(given))
+    return code
+
+
+def _unknown(name: str) -> str:
+    """Return the error for a subcommand that does not exist."""
+    from mjxgait.config.layers import shipped_creatures
+
+    if name in shipped_creatures():
+        return f'"{name}" is a creature; evolve its walk with: mjxgait train {name}'
+    return f'unknown subcommand "{name}"; {did_you_mean(name, COMMANDS)}'
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the console command. For exit codes see docs/reference/command-line.md."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if not given:
+        print(_usage())
+        sys.exit(2)
     try:
-        if given[0] in MOVED:
-            raise UserError(MOVED[given[0]])
-        if given[0] not in COMMANDS:
-            raise UserError(f'unknown subcommand "{given[0]}"; {did_you_mean(given[0], COMMANDS)}')
-        module = importlib.import_module(
-            f"mjxgait.cli.{given[0] + '_' * keyword.iskeyword(given[0])}"
-        )
-        sys.exit(getattr(module, f"{given[0]}_command")(_with_own_parts(given)))
+        given = _meant(given)
+        if given[0] in ("-h", "--help", "--help-all"):
+            print(_usage())
+            sys.exit(0)
+        if given[0] in ("-V", "--version"):
+            print(f"mjxgait {importlib.metadata.version('mjxgait')}")
+            sys.exit(0)
+        sys.exit(_run(given))
     except NotLoaded as error:
         print(f"mjxgait: {error}", file=sys.stderr)
         if error.options:

@@ -8,6 +8,8 @@ from typing import Literal
 
 import tyro
 
+from mjxgait.cli.options import parsed
+
 
 @dataclasses.dataclass(frozen=True)
 class PlotOptions:
@@ -29,7 +31,7 @@ class PlotOptions:
 
 def plot_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(PlotOptions, args=list(arguments), prog="mjxgait plot")
+    options = parsed(PlotOptions, "plot", arguments)
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     from mjxgait.rendering.plots import plot_run
 

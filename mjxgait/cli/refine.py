@@ -11,6 +11,7 @@ import tyro
 
 from mjxgait.api import Run, load_creature
 from mjxgait.api.make import evolve
+from mjxgait.cli.options import Verbosity, parsed
 from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import read_toml
 from mjxgait.creature import Creature
@@ -24,7 +25,7 @@ from mjxgait.training.folder import (
 
 
 @dataclasses.dataclass(frozen=True)
-class RefineOptions:
+class RefineOptions(Verbosity):
     """Make a hand-made or captured cycle walk: its key poses change only within --keep.
 
     Attributes:
@@ -69,13 +70,14 @@ class RefineOptions:
 
 def refine_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(RefineOptions, args=list(arguments), prog="mjxgait refine")
+    options = parsed(RefineOptions, "refine", arguments)
+    quiet = options.quiet and not options.only_show
     from mjxgait.animation.keys import bring, refine
     from mjxgait.animation.keys.refine import base_settings, begin, refining
 
     if options.resume:
         runs = refine.runs_in(options.resume)
-        return _front(options.resume, runs) if runs else _resumed(options.resume)
+        return _front(options.resume, runs, quiet) if runs else _resumed(options.resume, quiet)
     if options.keys is None:
         raise UserError("name the file with the cycle: mjxgait refine --env duck --keys walk.glb")
     creature = load_creature(options.env)
@@ -89,7 +91,7 @@ def refine_command(arguments: Sequence[str]) -> int:
         (options.begin, options.end),
         np.radians(options.tolerance),
         options.forward,
-        print,
+        (lambda said: None) if quiet else print,
     )
     configs = [refining(base, brought, keep) for keep in options.keep]
     if options.only_show:
@@ -97,13 +99,13 @@ def refine_command(arguments: Sequence[str]) -> int:
     if len(configs) == 1:
         folder = check_run(options.out, creature, configs[0])
         write = partial(begin, folder, creature, configs[0], options.keys, brought)
-        return _run(folder, creature, configs[0], write)
+        return _run(folder, creature, configs[0], write, quiet)
     out = options.out or new_run_folder(creature.name, options.seed)
     refine.check_front(out, options.keep)
     _check(creature, configs[0])
     for keep, config in zip(options.keep, configs, strict=True):
         begin(refine.folder_of(out, keep), creature, config, options.keys, brought)
-    return _front(out, refine.runs_in(out))
+    return _front(out, refine.runs_in(out), quiet)
 
 
 def _check(creature: Creature, config: Config) -> None:
@@ -116,20 +118,20 @@ def _check(creature: Creature, config: Config) -> None:
     check_spec(creature, config)
 
 
-def _front(out: Path, runs: Sequence[Path]) -> int:
+def _front(out: Path, runs: Sequence[Path], quiet: bool) -> int:
     """Finish all runs of a trade-off plot, the most faithful first, and draw it."""
     from mjxgait.animation.keys import refine
 
     for run in runs:
         print(f"{run}:")
-        if not refine.finished(run) and _resumed(run) == INTERRUPTED:
+        if not refine.finished(run) and _resumed(run, quiet) == INTERRUPTED:
             print(f"To go on: mjxgait refine --resume {out}")
             return INTERRUPTED
     print(f"Side by side: {refine.draw(out)}")
     return 0
 
 
-def _resumed(folder: Path) -> int:
+def _resumed(folder: Path, quiet: bool) -> int:
     """Continue a run; see `_run`."""
     from mjxgait.animation.keys.refine import read_original
     from mjxgait.training.ended import nothing_left
@@ -140,7 +142,7 @@ def _resumed(folder: Path) -> int:
         print(over)
         _tell(folder, creature)
         return 0
-    return _run(folder, creature, config)
+    return _run(folder, creature, config, quiet=quiet)
 
 
 def _run(
@@ -148,6 +150,7 @@ def _run(
     creature: Creature,
     config: Config,
     write: Callable[[], object] | None = None,
+    quiet: bool = False,
 ) -> int:
     """Evolve near the cycle, examine the champion, and print its departure.
 
@@ -157,7 +160,7 @@ def _run(
     from mjxgait.training.stages import prepare_devices
 
     prepare_devices()
-    screen = Screen()
+    screen = Screen(quiet=quiet)
     begin = write or (lambda: None)
     if not evolve(folder, creature, config, screen, write is None, begin=begin):
         return INTERRUPTED

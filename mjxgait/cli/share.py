@@ -6,7 +6,7 @@ from pathlib import Path
 
 import tyro
 
-from mjxgait.errors import UserError
+from mjxgait.cli.options import parsed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,38 +33,8 @@ class ShareOptions:
 
 def share_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(ShareOptions, args=list(arguments), prog="mjxgait share")
-    if options.out.suffix.lower() not in (".html", ".htm"):
-        raise UserError(
-            f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
-        )
-    if options.wasm and not options.physics:
-        raise UserError(
-            "--wasm names what --physics puts into the page; add --physics, or leave it out"
-        )
-    from mjxgait.training.stored import require_writable
+    options = parsed(ShareOptions, "share", arguments)
+    from mjxgait.api.exports import share
 
-    require_writable(options.out)
-    said = _write(options)
-    print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB)")
-    if said:
-        print(said)
+    share(options.run, options.out, physics=options.physics, wasm=options.wasm, tell=print)
     return 0
-
-
-def _write(options: ShareOptions) -> str:
-    """Write the page; return a notice for the screen, or nothing."""
-    from mjxgait.experiments.repertoire.clips import write_driven
-    from mjxgait.experiments.repertoire.grid import GRID
-    from mjxgait.web.page import write_page
-    from mjxgait.web.physics import write_physics_page
-
-    repertoire = (options.run / GRID).is_file()
-    if options.physics and repertoire:
-        raise UserError(
-            f"{options.run}: a repertoire, whose page plays animation; name one of its runs for "
-            "--physics"
-        )
-    if options.physics:
-        return write_physics_page(options.run, options.out, options.wasm)
-    return (write_driven if repertoire else write_page)(options.run, options.out)

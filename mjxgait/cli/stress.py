@@ -8,6 +8,8 @@ from typing import Annotated
 
 import tyro
 
+from mjxgait.cli.options import parsed
+
 
 @dataclasses.dataclass(frozen=True)
 class StressOptions:
@@ -28,7 +30,7 @@ class StressOptions:
 
 def stress_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    options = tyro.cli(StressOptions, args=list(arguments), prog="mjxgait stress")
+    options = parsed(StressOptions, "stress", arguments)
     from mjxgait.certification.stress import StressConfig, stress
     from mjxgait.errors import UserError
     from mjxgait.files import write_text

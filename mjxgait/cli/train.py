@@ -3,21 +3,21 @@
 import argparse
 import contextlib
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
-
-import tyro
+from typing import TYPE_CHECKING
 
 from mjxgait.api import Run, load_creature
 from mjxgait.api.make import evolve
+from mjxgait.cli.options import parsed
+from mjxgait.cli.train_options import TrainOptions, options_of, short_options
 from mjxgait.cli.zoo import evolve_zoo
-from mjxgait.config.schema import Config, ExaminationConfig, Physics
+from mjxgait.config.schema import Config, ExaminationConfig
 from mjxgait.config.tables import build, merge
 from mjxgait.controllers.expressions.written import with_expressions
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import Way, at_step, parse_scales
+from mjxgait.creature.scale import at_step, parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.experiments.multi_seed import check_zoo, create_zoo, folders_of, is_zoo
 from mjxgait.plugins.registry import meant
@@ -42,99 +42,15 @@ from mjxgait.training.stored import disk_errors
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.training.screen import Screen
 
-Tracker = Literal["tensorboard", "wandb"]
-
-
-@dataclasses.dataclass(frozen=True)
-class TrainOptions:
-    """Evolve a walk for a creature.
-
-    Settings come in layers, each overriding the one before: configs/default.toml, the creature's
-    own [train] table, the file of --config, and the options given here. Every key of the config is
-    an option. --controller and --task select the controller and the task, such as poses and walk,
-    or FILE.py:CLASS of your own (docs/guide/your-own-task.md).
-
-    Attributes:
-      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to
-        import on the fly.
-      config: TOML file with settings, or the name of a shipped config such as wilson.
-      scale: Size factors of parts, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
-        (docs/reference/creature-folder.md). Lengths, masses and inertias follow, gains do not.
-      way: back, left or right: direction in the creature's own frame; forward by default
-        (docs/guide/gaits.md).
-      expressions: File of handwritten programs as the start of evolution, for --controller program
-        (docs/reference/expressions.md).
-      source: Run folder; its last population is the first of the new run, which may have another
-        task or other settings.
-      out: Folder for the run; by default a new one under runs/.
-      runs: Number of separate runs side by side, with seeds from --seed on: a folder with a run
-        folder each, and a picture of all champions (docs/guide/studies.md).
-      resume: Run folder to continue, with its own creature and settings. Only the settings that end
-        a run may differ: --generations, --evolution.target, --examination.
-      generation: With --resume: the checkpoint to continue from, instead of the latest.
-      population: Short for --evolution.population.
-      generations: Short for --evolution.generations.
-      evolve_body: Short for --evolution.body: 1.25 lets the parts below the trunk become up to a
-        quarter larger or a fifth smaller; the run stores the winning body in body/.
-      speed: Target speed: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
-        This and the next four are for walking (docs/guide/gaits.md).
-      gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave
-        (six),
-        walk, waddle, hop (two), natural (an animal's at this speed), or auto (whatever evolves). By
-        default that of [usual] in creature.toml, or else whatever evolves.
-      turn: Turn rate while walking, degrees per second to the left.
-      steer: Largest commanded turn rate that the walk must follow, degrees per second to either
-        side.
-      style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
-      certificate: walks, or anywhere: trains on uneven ground until the walk passes `mjxgait
-        stress` (docs/reference/certificate.md).
-      cluster: Evolve on a Ray cluster: HOST:PORT, or auto for the cluster that this machine belongs
-        to (docs/guide/cluster.md).
-      ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
-      physics: Short for --rollout.physics: mjx simulates with MJX itself, auto with this program's
-        faster step where it supports the model (docs/research/performance.md).
-      log: Log for a tracker, repeatable: tensorboard writes event files into the run folder, wandb an
-        offline run (docs/guide/research-tools.md).
-      view: Show the best of each generation walking on a page that only this machine can reach.
-      plots: Draw all plots at the end of the run (`mjxgait plot`).
-      settings: The config, key by key.
-    """
-
-    env: str = "tall_quadruped"
-    config: str | None = None
-    scale: tuple[str, ...] = ()
-    way: Way = "forward"
-    expressions: Path | None = None
-    source: Annotated[Path | None, tyro.conf.arg(name="from")] = None
-    out: Path | None = None
-    runs: int | None = None
-    resume: Path | None = None
-    generation: int | None = None
-    population: int | None = None
-    generations: int | None = None
-    evolve_body: float | None = None
-    speed: str | None = None
-    gait: str | None = None
-    turn: float | None = None
-    steer: float | None = None
-    style: str | None = None
-    certificate: str | None = None
-    cluster: str | None = None
-    ground: str | None = None
-    physics: Physics | None = None
-    log: Annotated[tuple[Tracker, ...], tyro.conf.UseAppendAction] = ()
-    view: bool = False
-    plots: bool = True
-    settings: Annotated[Config, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Config)
-
 
 def train_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
-    creature, default = _layers(arguments)
-    shape = _options_of(type(default))
-    options = tyro.cli(
-        shape, args=list(arguments), prog="mjxgait train", default=shape(settings=default)
-    )
+    if {"-h", "--help"} & set(arguments):
+        parsed(short_options(), "train", ["--help"])
+    notes: list[str] = []
+    creature, default = _layers(arguments, notes.append)
+    shape = options_of(type(default))
+    options = parsed(shape, "train", arguments, shape(settings=default))
     config = _settings(options)
     if not options.resume:
         creature = at_step(creature, config.rollout.step)
@@ -147,8 +63,9 @@ def train_command(arguments: Sequence[str]) -> int:
         )
     if options.source and (options.resume or options.runs is not None):
         raise UserError("--from: for a single new run, without --resume and --runs")
-    if said := hint(config):
-        print(said)
+    if not options.quiet:
+        for line in (*notes, *filter(None, [hint(config)])):
+            print(line)
     if options.runs is not None or _is_zoo(options.resume):
         return _several(options, creature, config, default)
     if options.generation is not None and options.resume is None:
@@ -188,7 +105,7 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
     prepare_devices(1 if options.cluster else None)
     resumed = options.resume is not None
     with contextlib.ExitStack() as beside:
-        screen = beside.enter_context(tracked(folder, options.log))
+        screen = beside.enter_context(tracked(folder, options.log, options.quiet))
 
         def begin() -> None:
             if not resumed:
@@ -214,31 +131,18 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
         together = 1 if options.cluster else 0
         zoo = check_zoo(options.out, creature, config, options.runs)
         begin = partial(create_zoo, zoo, creature, config, options.runs, together)
-        return evolve_zoo(zoo, options.cluster, begin)
+        return evolve_zoo(zoo, options.cluster, begin, options.quiet)
     other = options.scale or options.way != "forward"
     if options.runs is not None or other or config != default:
         raise UserError(
             f"{options.resume}: resumed runs keep their number, body and settings; only --cluster "
             "may be given"
         )
-    return evolve_zoo(options.resume, options.cluster)
+    return evolve_zoo(options.resume, options.cluster, quiet=options.quiet)
 
 
 def _is_zoo(folder: Path | None) -> bool:
     return folder is not None and is_zoo(folder)
-
-
-def _options_of(config: type[Config]) -> type[TrainOptions]:
-    """Return the options class with every key of this config."""
-    settings = Annotated[config, tyro.conf.arg(name="")]  # type: ignore[valid-type]
-    field = ("settings", settings, dataclasses.field(default_factory=config))
-    return dataclasses.make_dataclass(
-        "TrainOptions",
-        [field],
-        bases=(TrainOptions,),
-        frozen=True,
-        namespace={"__doc__": TrainOptions.__doc__},
-    )
 
 
 def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
@@ -269,8 +173,13 @@ def _plot_fitness(folder: Path) -> None:
             plot_fitness(lines, folder / PLOT)
 
 
-def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
-    """Return the creature and the settings below the options; they are the options' defaults."""
+def _layers(
+    arguments: Sequence[str], tell: Callable[[str], object] = lambda said: None
+) -> tuple[Creature, Config]:
+    """Return the creature and the settings below the options; they are the options' defaults.
+
+    tell: called with the notes of the import of a model file.
+    """
     early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for name in ("--env", "--config", "--resume", "--use.controller", "--use.task"):
         early.add_argument(name, nargs="?")
@@ -292,7 +201,7 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
         return open_run(folders_of(folder)[0] if is_zoo(folder) else folder)
     scales = parse_scales(given.scale or ())
     way = given.way or "forward"
-    creature = load_creature(given.env or TrainOptions.env, scales, print, way)
+    creature = load_creature(given.env or TrainOptions.env, scales, tell, way)
     file = Path(given.config) if given.config else None
     named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
     use = {kind: name for kind, name in named.items() if name}

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import tyro
 
+from mjxgait.cli.options import parsed
 from mjxgait.plugins.user_code import loaded
 from mjxgait.processes import python_command, safe_environment
 
@@ -32,7 +33,7 @@ class ViewOptions:
 
 def view_command(arguments: Sequence[str]) -> int:
     """Serve the page until interrupted; return the exit code."""
-    options = tyro.cli(ViewOptions, args=list(arguments), prog="mjxgait view")
+    options = parsed(ViewOptions, "view", arguments)
     from mjxgait.web.live import serve
 
     # Background processes of a script ignore interrupts, and Python leaves it so: without this

@@ -18,16 +18,6 @@ def data_folder(kind: Literal["envs", "configs"]) -> Path:
     return packaged if packaged.is_dir() else package.parent / kind
 
 
-def install_command(extra: str) -> str:
-    """Return the command that installs an extra, of the package or of the checkout in use."""
-    checkout = Path(str(resources.files("mjxgait"))).parent
-    if not (checkout / "pyproject.toml").is_file():
-        return f'pip install "mjxgait[{extra}]"'
-    # Editable: a plain install would replace the checkout by a copy of the package.
-    place = "." if checkout.resolve() == Path.cwd().resolve() else checkout
-    return f'pip install -e "{place}[{extra}]"'
-
-
 def shipped_creatures() -> list[str]:
     """Return the names of the shipped creatures."""
     return sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
@@ -59,7 +49,7 @@ def find_creature(name: str) -> Path:
         raise UserError(f"{folder}: no such file or folder")
     raise UserError(
         f'unknown creature "{name}"; {did_you_mean(name, known)} '
-        "(`mjxgait envs` lists all; the path of a folder or of a model file will do too)"
+        "(`mjxgait list` lists all; the path of a folder or of a model file will do too)"
     )
 
 

@@ -148,8 +148,8 @@ def check_whole(value: "DataclassInstance", table: Table, where: str) -> None:
     """
     if missing := _missing(_without_none(dataclasses.asdict(value)), table, added_in(type(value))):
         raise UserError(
-            f'{where}: the key "{missing}" is missing, and what a default would put in its place is '
-            "not what was meant; write it there again, or take the whole folder from a copy"
+            f'{where}: the key "{missing}" is missing; write it there again, or take the folder '
+            "from a copy"
         )
 
 

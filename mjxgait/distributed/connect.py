@@ -11,9 +11,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from mjxgait.config.layers import install_command
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 
 
 @dataclasses.dataclass(frozen=True)

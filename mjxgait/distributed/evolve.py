@@ -109,7 +109,7 @@ def evolve(
     several = config.evolution.islands.count > 1
     if several and generation is not None:
         raise UserError(f"{folder}: islands go on from their latest checkpoints, not --generation")
-    with scheduler_at(cluster, screen.console) as scheduler:
+    with scheduler_at(cluster, screen.progress) as scheduler:
         if several:
             return islands.train(folder, creature, config, screen, scheduler, resume, begin)
         evaluator = ChunkedEvaluator(scheduler, creature, config)

@@ -1,7 +1,6 @@
 """Pictures by MuJoCo's own renderer if GL works; a separate process tests that."""
 
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,15 +10,14 @@ import numpy as np
 from PIL import Image
 
 from mjxgait.errors import UserError
-from mjxgait.processes import python_command, safe_environment
+from mjxgait.processes import python_command
 from mjxgait.rendering.floor import band_lines
+from mjxgait.rendering.gl_probe import OFF, candidates, environment_of
 from mjxgait.rendering.painter import lamp_direction
 from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.surroundings import BANDS, write_marks
 
 WORKER = "mjxgait.rendering.gl_worker"
-OFF = ("disable", "disabled", "off", "false", "0")
-"""Values of MUJOCO_GL for no GL."""
 GROUND_CELL = 0.08
 """Cell of the height field for uneven ground, in hip heights."""
 PATIENCE = 60.0
@@ -36,16 +34,13 @@ def working_backend(stage: Stage, wanted: str | None = None) -> tuple[str | None
         return None, f"drawn without GL, as MUJOCO_GL={wanted} says"
     if not stage.alike:
         return None, "drawn without GL, which draws several creatures of one kind only"
-    candidates = (
-        [wanted] if wanted else ["egl", "osmesa"] if sys.platform == "linux" else ["default"]
-    )
     reasons = []
-    for backend in candidates:
+    for backend in candidates(wanted):
         with tempfile.TemporaryDirectory() as folder:
             try:
                 done = subprocess.run(
                     _command(stage, [0], Path(folder)),
-                    env=_environment(backend),
+                    env=environment_of(backend),
                     capture_output=True,
                     timeout=PATIENCE,
                 )
@@ -74,7 +69,7 @@ def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[I
     with tempfile.TemporaryDirectory() as folder:
         command = _command(stage, frames, Path(folder))
         worker = subprocess.Popen(
-            command, env=_environment(backend), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+            command, env=environment_of(backend), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         )
         assert worker.stdout is not None
         try:
@@ -166,8 +161,3 @@ def _command(stage: Stage, frames: Sequence[int], folder: Path) -> list[str]:
     path = folder / "scene.npz"
     scene_file(stage, frames, path)
     return python_command(WORKER, str(path))
-
-
-def _environment(backend: str) -> dict[str, str]:
-    chosen = {} if backend == "default" else {"MUJOCO_GL": backend, "PYOPENGL_PLATFORM": backend}
-    return {key: value for key, value in safe_environment().items() if key != "MUJOCO_GL"} | chosen

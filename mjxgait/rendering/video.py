@@ -9,8 +9,8 @@ from types import ModuleType
 import numpy as np
 from PIL import Image, ImageDraw
 
-from mjxgait.config.layers import install_command
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.files import replaced, writing
 from mjxgait.rendering.floor import DARK_INK, font
 from mjxgait.rendering.gl import gl_pictures

@@ -4,7 +4,9 @@ A folder may come from anywhere, so its entries are only printed; the user decid
 """
 
 import dataclasses
+import importlib.metadata
 import json
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -30,7 +32,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.proportions import extreme_bodies
 from mjxgait.errors import NotLoaded, UserError
 from mjxgait.evolution.state import NOBODY
-from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, write_text, writing
+from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, read_text, write_text, writing
 from mjxgait.plugins import build_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.user_code import KINDS, places_of
@@ -83,6 +85,38 @@ def _shown(place: object, name: str) -> str:
         return name
     path = Path(place)
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else place
+
+
+MADE_BY = re.compile(r"# Settings of a run, by mjxgait (\S+)")
+"""First line of the settings of a run."""
+
+
+def own_version() -> str:
+    """Return the version of this program."""
+    return importlib.metadata.version("mjxgait")
+
+
+def version_of(folder: Path) -> str | None:
+    """Return the version of the program that made a run folder; None if it is not stored."""
+    found = MADE_BY.match(read_text(folder / CONFIG))
+    return found[1] if found else None
+
+
+def _made_by(version: str) -> str:
+    return f"# Settings of a run, by mjxgait {version}"
+
+
+def _of_version(error: UserError, folder: Path) -> UserError:
+    """Return the error about a run's settings; a shorter one if another version made the run."""
+    made, own = version_of(folder), own_version()
+    if made == own:
+        return error
+    by = f"mjxgait {made}" if made else "an earlier mjxgait"
+    reason = str(error).removeprefix(f"{folder / CONFIG}: ").partition(";")[0]
+    return UserError(
+        f"{folder / CONFIG}: made by {by}, whose settings mjxgait {own} does not read ({reason}); train it "
+        "anew, or read it with the version that made it"
+    )
 
 
 CREATURE, METRICS, CHAMPION = "creature", "metrics.jsonl", "champion.json"
@@ -174,7 +208,7 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
     with writing(folder):
         keep_body(folder / CREATURE, creature)
         keep_places(folder, config.use)
-        write_text(folder / CONFIG, dump_toml(config))
+        write_text(folder / CONFIG, f"{_made_by(own_version())}\n{dump_toml(config)}")
     return folder
 
 
@@ -201,12 +235,14 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
     """
     if not (folder / CONFIG).exists():
         raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
+    table = read_toml(folder / CONFIG)
     try:
-        table = read_toml(folder / CONFIG)
         config = build_config(table, str(folder / CONFIG))
+        check_whole(config, table, str(folder / CONFIG))
     except NotLoaded as error:
         raise with_options(error, folder) from None
-    check_whole(config, table, str(folder / CONFIG))
+    except UserError as error:
+        raise _of_version(error, folder) from None
     return load_creature(folder / CREATURE).on(config.rollout.ground), config
 
 

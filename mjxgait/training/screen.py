@@ -1,7 +1,7 @@
 """Progress output of a run: a live line in a terminal, elsewhere one plain line per generation."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +16,7 @@ from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.certification.describe import in_words
 from mjxgait.config.schema import Config
 from mjxgait.creature.ground.spec import FLAT
+from mjxgait.output import LOG, Output
 from mjxgait.tasks.walk.target_criteria import in_the_way
 from mjxgait.training.folder import (
     CHAMPION,
@@ -31,11 +32,20 @@ if TYPE_CHECKING:
     from mjxgait.training.experiment import Experiment
 
 
-class Screen:
-    """Prints the progress of one run."""
+class Screen(Output):
+    """Prints the progress of one run.
 
-    def __init__(self, console: Console | None = None) -> None:
-        self.console = console or Console(highlight=False, soft_wrap=True, markup=False)
+    listeners: called with the line of each generation, once that is in `metrics.jsonl`.
+    """
+
+    def __init__(
+        self,
+        console: Console | None = None,
+        quiet: bool = False,
+        listeners: tuple[Callable[[Line], object], ...] = (),
+    ) -> None:
+        super().__init__(console, quiet)
+        self.listeners = listeners
         self._status: Status | None = None
         self._walls: list[float] = []
         self._first: tuple[float, int] | None = None
@@ -44,24 +54,21 @@ class Screen:
     def compiling(self, what: str, experiment: "Experiment") -> Iterator[None]:
         """Show that the program is being compiled, and the time it takes."""
         config = experiment.config
-        self.console.print(
+        self.say(
             f"{what}: population {config.evolution.population}, {config.rollout.starts} starts of "
             f"{config.rollout.seconds:g} s, seed {config.seed}"
         )
         began = time.perf_counter()
-        if self.console.is_terminal:
+        LOG.info("Compiling…")
+        if self.progress.is_terminal:
             columns = (SpinnerColumn(), TextColumn("Compiling…"), TimeElapsedColumn())
-            with Progress(*columns, console=self.console, transient=True) as progress:
+            with Progress(*columns, console=self.progress, transient=True) as progress:
                 progress.add_task("compile")
                 yield
         else:
-            self.console.print("Compiling…")
+            self.progress.print("Compiling…")
             yield
-        self.console.print(f"Compiled in {time.perf_counter() - began:.1f} s")
-
-    def say(self, text: str) -> None:
-        """Print a line."""
-        self.console.print(text)
+        self.say(f"Compiled in {time.perf_counter() - began:.1f} s")
 
     def generation(self, line: Line, config: Config) -> None:
         """Show a generation of a run with these settings; see `metrics_line`."""
@@ -83,13 +90,16 @@ class Screen:
             f"steps/s  {'at most ' if sooner else ''}{left} left"
             + ("  forced evolution" if line["forced"] else "")
         )
-        if self.console.is_terminal:
+        if self.progress.is_terminal:
+            LOG.info("%s", text)
             if self._status is None:
-                self._status = self.console.status(text)
+                self._status = self.progress.status(text)
                 self._status.start()
             self._status.update(text)
         else:
-            self.console.print(text)
+            self.say(text)
+        for listener in self.listeners:
+            listener(line)
 
     def _seconds(self, line: Line) -> float:
         """Return the expected time of a generation in s.
@@ -178,9 +188,9 @@ class Screen:
         }
         if not certified:
             steps["inspect", folder] = "tells how evolution went; another --seed may do better"
-        self.console.print("Next:")
+        self.say("Next:")
         for words, what in steps.items():
-            self.console.print(f"  {command(*words, run=folder)}   {what}", markup=False)
+            self.progress.print(f"  {command(*words, run=folder)}   {what}", markup=False)
 
 
 def what_ends_sooner(config: Config) -> str:

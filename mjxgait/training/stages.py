@@ -6,7 +6,7 @@ Only the program that simulates is worth the compiler's best effort.
 import contextlib
 import dataclasses
 import functools
-import os
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
@@ -15,8 +15,10 @@ from typing import Literal
 import jax
 from jax.sharding import NamedSharding, PartitionSpec
 
+from mjxgait.cache import own_folder
 from mjxgait.config.schema import Config
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
+from mjxgait.output import LOG
 from mjxgait.processes import cores
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.simulation.rollout import Simulator
@@ -46,9 +48,9 @@ def prepare_devices(devices: int | None = None, kind: str = "") -> None:
     if jax.config.values["jax_num_cpu_devices"] < 0:
         jax.config.update("jax_num_cpu_devices", devices or cores())
     if jax.config.values["jax_compilation_cache_dir"] is None:
-        cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-        jax.config.update("jax_compilation_cache_dir", os.path.join(cache, "mjxgait", "jax", kind))
+        jax.config.update("jax_compilation_cache_dir", str(own_folder() / kind))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    LOG.debug("compiled programs: %s", jax.config.values["jax_compilation_cache_dir"])
 
 
 def everywhere(simulator: Simulator) -> NamedSharding:
@@ -177,7 +179,12 @@ def compile_stages(
 
     def in_turn(part: str, program: jax.stages.Lowered) -> jax.stages.Compiled:
         with turn(part):
-            return compiled(program, efforts.get(part, "least"))
+            began = time.perf_counter()
+            done = compiled(program, efforts.get(part, "least"))
+            LOG.debug(
+                "%s: compiled, or read from the cache, in %.1f s", part, time.perf_counter() - began
+            )
+            return done
 
     with ThreadPoolExecutor() as aside:
         found = {part: aside.submit(in_turn, part, program) for part, program in programs}

@@ -10,10 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from mjxgait.config.layers import install_command
-from mjxgait.config.schema import Config
 from mjxgait.config.tables import read_toml
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.training.folder import CONFIG, METRICS, Line, read_metrics
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import disk_errors
@@ -145,22 +144,8 @@ def _package(name: str, extra: str) -> Any:
         raise UserError(f"--log {extra} needs an extra: {install_command(extra)}") from None
 
 
-class TrackedScreen(Screen):
-    """A screen that also passes each generation on to trackers."""
-
-    def __init__(self, trackers: Sequence[Tracker]) -> None:
-        super().__init__()
-        self.trackers = trackers
-
-    def generation(self, line: Line, config: Config) -> None:
-        """See `Screen`."""
-        super().generation(line, config)
-        for tracker in self.trackers:
-            tracker.write(line)
-
-
 @contextmanager
-def tracked(folder: Path, names: Sequence[str]) -> Iterator[Screen]:
+def tracked(folder: Path, names: Sequence[str], quiet: bool = False) -> Iterator[Screen]:
     """Yield a screen whose generations the named trackers log, and close these at the end.
 
     Raises:
@@ -168,7 +153,7 @@ def tracked(folder: Path, names: Sequence[str]) -> Iterator[Screen]:
     """
     trackers = [KINDS[name](folder) for name in dict.fromkeys(names)]
     try:
-        yield TrackedScreen(trackers)
+        yield Screen(quiet=quiet, listeners=tuple(tracker.write for tracker in trackers))
     finally:
         for tracker in trackers:
             tracker.close()

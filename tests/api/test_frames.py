@@ -8,9 +8,9 @@ import pytest
 from helpers import STOOL, small_config
 
 import mjxgait
-from mjxgait.config.layers import install_command
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.training.folder import create_run
 
 MISSING = {"best": None, "mean": None, "forced": False}

@@ -1,9 +1,11 @@
 """The Python API: what the command line does, from Python."""
 
 import json
+import logging.handlers
 import pydoc
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ import mjxgait
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import scaled
 from mjxgait.errors import UserError
+from mjxgait.output import LOG
 from mjxgait.training.experiment import build_experiment
 
 SMALL = {
@@ -30,11 +33,50 @@ def short() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory) -> mjxgait.Run:
+def lines() -> list[dict]:
+    """The lines that the run passed on while it ran."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def records() -> list[logging.LogRecord]:
+    """What the run logged."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, lines: list[dict], records: list[logging.LogRecord]) -> mjxgait.Run:
     folder = tmp_path_factory.mktemp("runs") / "x"
-    return mjxgait.train(
-        STOOL, out=folder, seed=3, population=6, generations=2, settings=SMALL, quiet=True
-    )
+    handler = logging.handlers.QueueHandler(SimpleNamespace(put_nowait=records.append))
+    LOG.addHandler(handler)
+    LOG.setLevel(logging.DEBUG)
+    try:
+        return mjxgait.train(
+            STOOL,
+            out=folder,
+            seed=3,
+            population=6,
+            generations=2,
+            settings=SMALL,
+            quiet=True,
+            on_generation=lines.append,
+        )
+    finally:
+        LOG.removeHandler(handler)
+        LOG.setLevel(logging.NOTSET)
+
+
+def test_each_generation_is_passed_on_and_logged(
+    run: mjxgait.Run, lines: list[dict], records: list[logging.LogRecord]
+):
+    logged = (run.folder / "metrics.jsonl").read_text().splitlines()
+    assert lines == [json.loads(line) for line in logged]
+    told = {level: [] for level in (logging.DEBUG, logging.INFO)}
+    for record in records:
+        told[record.levelno].append(record.getMessage())
+    assert "Compiling…" in told[logging.INFO]
+    assert sum(text.startswith("generation ") for text in told[logging.INFO]) == len(lines) == 3
+    assert any(text.startswith("evaluate: compiled") for text in told[logging.DEBUG])
 
 
 def test_a_run_has_the_contents_of_its_folder(run: mjxgait.Run):

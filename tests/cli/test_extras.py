@@ -8,8 +8,8 @@ import pytest
 
 from mjxgait.animation.export import export_usd
 from mjxgait.config import layers
-from mjxgait.config.layers import install_command
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.training.trackers import KINDS
 
 ROOT = Path(__file__).parents[2]

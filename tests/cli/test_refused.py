@@ -6,7 +6,7 @@ import pytest
 from animation.keys.made import swings, write
 from helpers import STOOL, said_by
 
-from mjxgait.cli.import_ import write_folder
+from mjxgait.api.bodies import write_folder
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.importer import Imported

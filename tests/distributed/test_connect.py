@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from helpers import STOOL
 
-from mjxgait.config.layers import install_command
 from mjxgait.distributed.connect import connected
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 
 
 def refusal(address: str) -> str:

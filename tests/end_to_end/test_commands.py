@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from animation.keys.made import columns, swings
-from end_to_end.shipped import CONFIGS, CREATURES, ROOT
+from end_to_end.shipped import CONFIGS, CREATURES, ROOT, STUDIES, STYLES, TASKS
 from end_to_end.walks import short_examination, small_settings, trained, walker
 from helpers import STOOL, said_by
 from web.engine import engine_folder
@@ -18,12 +18,14 @@ from mjxgait.creature import load_creature
 from mjxgait.training.folder import CERTIFICATE, open_run
 
 ELSEWHERE = {
+    "completion": "tests/end_to_end/test_commands.py::test_completion_knows_commands_and_options",
     "train": "tests/end_to_end/test_trainings.py::test_a_training_ends_with_a_certificate",
     "ablate": "tests/end_to_end/test_studies.py::test_a_study_ends_with_its_report",
     "view": "tests/web/test_live.py",
 }
 """Subcommands with their own tests, and where."""
 
+SHELLS = ("bash", "zsh", "fish")
 Made = Callable[[Path], tuple[list[str], str]]
 """Makes the arguments of a subcommand in a folder, and names the file it writes there."""
 
@@ -76,7 +78,9 @@ FORMS: dict[str, list[Made]] = {
     "check": [
         lambda folder, name=name: ([name, "--out", "seen.png"], "seen.png") for name in CREATURES
     ],
-    "envs": [lambda folder: ([], "")],
+    "list": [lambda folder: ([], "")],
+    "doctor": [lambda folder: ([], "")],
+    "cache": [lambda folder: ([], ""), lambda folder: (["show"], "")],
 }
 EACH = [(name, number) for name, forms in FORMS.items() for number in range(len(forms))]
 
@@ -100,9 +104,36 @@ def test_every_subcommand_is_tested():
         assert f"def {test}" in (ROOT / file).read_text(encoding="utf-8")
 
 
-def test_envs_lists_all_creatures_and_configurations(capsys: pytest.CaptureFixture):
-    said = said_by(capsys, "envs", code=0)
-    assert [line.split()[0] for line in said.splitlines()] == [*CREATURES, *CONFIGS]
+@pytest.mark.parametrize("shell", SHELLS)
+def test_completion_knows_commands_and_options(shell: str, capsys: pytest.CaptureFixture):
+    said = said_by(capsys, "completion", shell, code=0)
+    assert all(name in said for name in COMMANDS)
+    assert "--evolve-body" in said
+
+
+def test_list_names_everything_that_ships(capsys: pytest.CaptureFixture):
+    said = said_by(capsys, "list", code=0)
+    sections = [section.splitlines() for section in said.strip().split("\n\n")]
+    named = {head.split()[0]: [line.split()[0] for line in lines] for head, *lines in sections}
+    assert named["creatures"] == CREATURES
+    assert named["configurations"] == CONFIGS
+    assert set(TASKS) <= set(named["tasks"])
+    assert named["styles"] == STYLES
+    assert named["studies"] == STUDIES
+    assert {"controllers", "gaits", "grounds"} <= named.keys()
+    assert all(len(line.split()) > 1 for _, *lines in sections for line in lines)
+    assert said_by(capsys, "envs", code=0) == said
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_subcommand_has_its_example(name: str, capsys: pytest.CaptureFixture):
+    said = said_by(capsys, name, "--help", code=0)
+    assert f"Example: {COMMANDS[name].example}" in said
+    assert "NoneType" not in said
+    assert "{None}" not in said
+    if name == "train":
+        assert len(said.splitlines()) < 60
+        assert "--evolution.elite" not in said
 
 
 @pytest.mark.slow

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from helpers import STOOL
 
-from mjxgait.config.layers import install_command
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.reference.bodies import Bodies
 
 gymnasium = pytest.importorskip("gymnasium")

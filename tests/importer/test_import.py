@@ -12,10 +12,10 @@ import pytest
 from helpers import altered, pose_champion
 from importer.models import BIPED, CORNERS, QUADRUPED, ROLLING
 
+from mjxgait.api.bodies import write_folder
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.cli import main
-from mjxgait.cli.import_ import write_folder
 from mjxgait.cli.train import _layers
 from mjxgait.config.layers import find_creature, resolve_config
 from mjxgait.creature import Creature, load_creature

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from importer.packages import MODELS, model_file
 
-from mjxgait.cli.import_ import write_folder
+from mjxgait.api.bodies import write_folder
 from mjxgait.creature import load_creature
 from mjxgait.creature.geometry import ancestors
 from mjxgait.creature.overlap import find_crossings

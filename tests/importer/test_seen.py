@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from importer.models import BIPED, QUADRUPED
 
+from mjxgait.api.bodies import write_folder
 from mjxgait.certification.check_body import check_body
-from mjxgait.cli.import_ import write_folder
 from mjxgait.creature import Creature, load_creature
 from mjxgait.importer import ImportChoices, Imported, import_model, stance
 from mjxgait.importer.orient import _named_front

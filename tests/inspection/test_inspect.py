@@ -116,7 +116,7 @@ def test_verify_exits_with_0_only_if_all_measures_are_equal(run, capsys, monkeyp
     fingerprint = read_champion(run / CHAMPION, read_snapshot(run).creature).fingerprint
     again = made_up_certificate(fingerprint)
     found = SimpleNamespace(document=lambda: again)
-    monkeypatch.setattr("mjxgait.api.make.certify", lambda *_: found)
+    monkeypatch.setattr("mjxgait.certification.certify", lambda *_: found)
     assert "not there" in said_by(capsys, "inspect", run, "--verify", code=2)
     (run / CERTIFICATE).write_text(json.dumps(again))
     assert "every measure is that" in said_by(capsys, "inspect", run, "--verify", code=0)

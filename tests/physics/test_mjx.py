@@ -9,8 +9,8 @@ import pytest
 from animation.keys.made import swings, write
 from helpers import STOOL, said_by, short_examination
 
+from mjxgait.api.repertoires import RepertoireRequest, planned
 from mjxgait.cli.refine import refine_command
-from mjxgait.cli.repertoire import RepertoireOptions, planned
 from mjxgait.cli.train import train_command
 from mjxgait.creature import Creature
 from mjxgait.experiments.ablation.plan import make_plan, read_study
@@ -65,7 +65,7 @@ def test_a_run_with_mjx_ends_with_a_certificate(
 
 def test_every_command_that_simulates_accepts_mjx(stool: Creature, tmp_path: Path):
     """Runs of a repertoire use it, and runs of a study whatever its variants set."""
-    options = RepertoireOptions(
+    options = RepertoireRequest(
         str(STOOL), speeds=("0.1",), turns=(), out=tmp_path / "set", physics="mjx"
     )
     assert {config.rollout.physics for config in planned(options).configs.values()} == {"mjx"}

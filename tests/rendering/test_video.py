@@ -8,8 +8,9 @@ from PIL import Image, ImageSequence
 from rendering.made_up import falling
 
 from mjxgait.cli import main
-from mjxgait.config.layers import find_creature, install_command
+from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
+from mjxgait.extras import install_command
 from mjxgait.rendering.floor import VIEWS
 from mjxgait.rendering.stage import Stage, smooth
 from mjxgait.rendering.video import Runner, condition, moving_pictures

@@ -16,9 +16,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rendering.made_up import metrics_line, treading, write_run
 
+from mjxgait.api import examining
 from mjxgait.certification import CertificateConfig, read_certificate, read_stress
 from mjxgait.champion import read_champion, write_champion
-from mjxgait.cli import certify
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import added_in
 from mjxgait.creature import Creature, load_creature
@@ -226,7 +226,7 @@ def test_a_full_disk_keeps_the_old_certificate(
     def full(self: Path, data: bytes) -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(certify, "examine", lambda run, config: Examined())
+    monkeypatch.setattr(examining, "examine", lambda run, config: Examined())
     monkeypatch.setattr(Path, "write_bytes", full)
     said = said_by(capsys, "certify", run, code=2)
     assert "certificate.json: cannot be written: No space left on device" in said

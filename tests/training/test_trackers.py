@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from helpers import STOOL, said_by
 
-from mjxgait.config.layers import install_command
+from mjxgait.extras import install_command
 from mjxgait.training.folder import Line, append_lines, truncate_metrics
 from mjxgait.training.trackers import TensorBoard, WandB, scalars
 

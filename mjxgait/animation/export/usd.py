@@ -20,8 +20,8 @@ from mjxgait.animation.export.skeleton import (
     world_poses,
 )
 from mjxgait.animation.export.surface import Piece, along_limbs, linear, pieces_of
-from mjxgait.config.layers import install_command
 from mjxgait.errors import UserError
+from mjxgait.extras import install_command
 from mjxgait.files import replaced
 
 if TYPE_CHECKING:

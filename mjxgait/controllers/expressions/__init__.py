@@ -10,5 +10,6 @@ KINDS = (
         reference="reference:ExpressionReference",
         serializer="serialize:ExpressionSerializer",
         report="report:ProgramView",
+        what="an expression for each joint (Gritz & Hahn)",
     ),
 )

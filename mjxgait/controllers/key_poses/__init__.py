@@ -10,5 +10,6 @@ KINDS = (
         reference="reference:PoseReference",
         serializer="serialize:PoseSerializer",
         report="report:PoseView",
+        what="key poses that stable PD tracks (Wilson)",
     ),
 )

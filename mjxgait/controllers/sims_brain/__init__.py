@@ -11,5 +11,6 @@ KINDS = (
         serializer="serialize:GraphSerializer",
         report="report:GraphView",
         grows=True,
+        what="neurons that grow with the body (Sims)",
     ),
 )

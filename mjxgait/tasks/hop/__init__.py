@@ -3,13 +3,21 @@
 from mjxgait.kinds import TaskKind
 
 KINDS = (
-    TaskKind("hop", __name__, task="task:Hop", criteria="criteria:HopCriteria", tables=("hop",)),
+    TaskKind(
+        "hop",
+        __name__,
+        task="task:Hop",
+        criteria="criteria:HopCriteria",
+        tables=("hop",),
+        what="get to a goal",
+    ),
     TaskKind(
         "limbo",
         __name__,
         task="limbo:Limbo",
         criteria="criteria:LimboCriteria",
         tables=("limbo",),
+        what="get to a goal beneath a bar",
     ),
     TaskKind(
         "travel",
@@ -17,5 +25,6 @@ KINDS = (
         task="task:Travel",
         criteria="criteria:TravelCriteria",
         tables=("travel",),
+        what="get from goal to goal",
     ),
 )

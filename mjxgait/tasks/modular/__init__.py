@@ -6,26 +6,42 @@ from mjxgait.kinds import TaskKind
 
 _kind = partial(TaskKind, home=__name__, modular=True)
 KINDS = (
-    _kind("swim", task="task:Swim", criteria="criteria:SwimCriteria", water=True, tables=("swim",)),
+    _kind(
+        "swim",
+        task="task:Swim",
+        criteria="criteria:SwimCriteria",
+        water=True,
+        tables=("swim",),
+        what="swim far; for bodies that grow",
+    ),
     _kind(
         "roam",
         task="task:Roam",
         criteria="criteria:RoamCriteria",
         called="walk",
         tables=("roam",),
+        what="get far on land; `--task walk` for bodies that grow",
     ),
-    _kind("jump", task="task:Jump", criteria="criteria:JumpCriteria", tables=("jump",)),
+    _kind(
+        "jump",
+        task="task:Jump",
+        criteria="criteria:JumpCriteria",
+        tables=("jump",),
+        what="jump high; for bodies that grow",
+    ),
     _kind(
         "follow",
         task="follow:FollowInWater",
         criteria="follow_criteria:in_water",
         water=True,
         tables=("swim", "roam", "follow"),
+        what="swim to a light that moves; for bodies that grow",
     ),
     _kind(
         "follow-on-land",
         task="follow:FollowOnLand",
         criteria="follow_criteria:on_land",
         tables=("roam", "follow"),
+        what="follow a light on land; for bodies that grow",
     ),
 )

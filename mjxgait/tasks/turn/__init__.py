@@ -2,4 +2,12 @@
 
 from mjxgait.kinds import TaskKind
 
-KINDS = (TaskKind("turn", __name__, task="task:Turn", criteria="criteria:TurnCriteria"),)
+KINDS = (
+    TaskKind(
+        "turn",
+        __name__,
+        task="task:Turn",
+        criteria="criteria:TurnCriteria",
+        what="turn to the left on the spot",
+    ),
+)

@@ -2,4 +2,12 @@
 
 from mjxgait.kinds import TaskKind
 
-KINDS = (TaskKind("walk", __name__, task="task:Walk", criteria="criteria:WalkCriteria"),)
+KINDS = (
+    TaskKind(
+        "walk",
+        __name__,
+        task="task:Walk",
+        criteria="criteria:WalkCriteria",
+        what="walk forward, at a speed, in a gait, on a turn",
+    ),
+)

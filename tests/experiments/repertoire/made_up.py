@@ -9,6 +9,8 @@ from pathlib import Path
 from helpers import STOOL
 from rendering.made_up import treading
 
+from mjxgait.api.repertoires import RepertoireRequest, planned
+from mjxgait.api.repertoires import begin as begin_repertoire
 from mjxgait.certification import (
     Certificate,
     CertificateConfig,
@@ -16,8 +18,6 @@ from mjxgait.certification import (
     Measure,
 )
 from mjxgait.champion import write_champion
-from mjxgait.cli.repertoire import RepertoireOptions, planned
-from mjxgait.cli.repertoire import begin as begin_repertoire
 from mjxgait.creature import Creature
 from mjxgait.experiments.repertoire.grid import Cell, Grid
 from mjxgait.training.folder import CERTIFICATE, CHAMPION, open_run
@@ -49,7 +49,7 @@ def _begun() -> tuple[tempfile.TemporaryDirectory, Grid]:
     settings = Path(made.name) / "set.toml"
     settings.write_text(SMALL)
     plan = planned(
-        RepertoireOptions(
+        RepertoireRequest(
             env=str(STOOL),
             speeds=("0.2", "0.4"),
             turns=(10.0,),

@@ -15,7 +15,7 @@ from helpers import STOOL, said_by
 from made_up_hands import Interrupted, Pretend
 from rendering.made_up import treading
 
-from mjxgait.cli import repertoire as command
+from mjxgait.api import repertoires as command
 from mjxgait.creature import Creature
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.experiments.repertoire.grid import POSES, Cell, Grid, evolve, mirrored

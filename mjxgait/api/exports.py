@@ -1,0 +1,181 @@
+"""The champion's walk as a file for other programs: animation, numbers, one page."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from mjxgait.api.run import Place, Run
+from mjxgait.errors import UserError
+from mjxgait.training.stored import require_writable
+
+if TYPE_CHECKING:
+    from mjxgait.animation.export import Character, WalkLoop
+    from mjxgait.rendering.walk import Walk
+
+KINDS = (".glb", ".bvh", ".usda", ".usdc", ".csv", ".json")
+NUMBERS = (".csv", ".json")
+PAGES = (".html", ".htm")
+Tell = Callable[[str], object]
+
+
+def export(
+    run: Run | Place,
+    out: Place,
+    *,
+    onto: Place | None = None,
+    rate: Literal[24, 30, 60] = 30,
+    travelling: bool = False,
+    tell: Tell = lambda said: None,
+) -> Path:
+    """Write the champion's walk as a loop (GLB, BVH, USD) or as numbers (CSV, JSON); return the file.
+
+    Does the same as `mjxgait export`.
+
+    Args:
+      out: the file; its ending chooses the format.
+      onto: the character (GLB) that the creature was imported from.
+      rate: key frames per second.
+      travelling: moves the root forward.
+      tell: called with what was written, and with doubts about the walk.
+
+    Raises:
+      UserError: no champion, a wrong ending, or the file cannot be written.
+    """
+    from mjxgait.animation.export import read_character, walk_loop
+    from mjxgait.rendering.video import LOOP_SECONDS, champion_of
+    from mjxgait.rendering.walk import doubt
+
+    folder, file = folder_of(run), Path(out)
+    over = None if onto is None else Path(onto)
+    _check_names(file, over)
+    require_writable(file)
+    character = None if over is None else read_character(over)
+    walk = champion_of(folder, LOOP_SECONDS).walk
+    said = (
+        _numbers(walk, file)
+        if file.suffix.lower() in NUMBERS
+        else _animation(walk_loop(walk, rate), character, file, travelling)
+    )
+    tell(f"{sized(file)}: {said}")
+    if doubts := doubt(folder, walk):
+        tell(doubts)
+    return file
+
+
+def share(
+    run: Run | Place,
+    out: Place,
+    *,
+    physics: bool = False,
+    wasm: Place | None = None,
+    tell: Tell = lambda said: None,
+) -> Path:
+    """Write one offline page with the champion in 3D, or a repertoire to steer; return the file.
+
+    Does the same as `mjxgait share`.
+
+    Args:
+      run: a run, or the folder of a repertoire.
+      out: the file, ending with .html.
+      physics: a page that simulates the champion instead of playing its walk.
+      wasm: folder of the unpacked npm package @mujoco/mujoco, instead of npm.
+      tell: called with what was written, and with doubts about the walk.
+
+    Raises:
+      UserError: no champion, a wrong ending, no WebAssembly build, or the file cannot be written.
+    """
+    folder, file = folder_of(run), Path(out)
+    if file.suffix.lower() not in PAGES:
+        raise UserError(f'{file}: cannot write "{file.suffix}"; end the name with .html')
+    if wasm and not physics:
+        raise UserError(
+            "--wasm names what --physics puts into the page; add --physics, or leave it out"
+        )
+    require_writable(file)
+    doubts = _write_page(folder, file, physics, Path(wasm) if wasm else None)
+    tell(sized(file))
+    if doubts:
+        tell(doubts)
+    return file
+
+
+def _write_page(folder: Path, file: Path, physics: bool, wasm: Path | None) -> str:
+    """Write the page; return doubts about the walk, or nothing."""
+    from mjxgait.experiments.repertoire.clips import write_driven
+    from mjxgait.experiments.repertoire.grid import GRID
+    from mjxgait.web.page import write_page
+    from mjxgait.web.physics import write_physics_page
+
+    repertoire = (folder / GRID).is_file()
+    if physics and repertoire:
+        raise UserError(
+            f"{folder}: a repertoire, whose page plays animation; name one of its runs for "
+            "--physics"
+        )
+    if physics:
+        return write_physics_page(folder, file, wasm)
+    return (write_driven if repertoire else write_page)(folder, file)
+
+
+def plot(
+    run: Run | Place, out: Place | None = None, formats: Sequence[str] = ("png", "svg")
+) -> list[Path]:
+    """Draw all plots of a run, and return their files.
+
+    Does the same as `mjxgait plot`. out: a folder; by default RUN/plots.
+
+    Raises:
+      UserError: no run, or the folder cannot be written.
+    """
+    from mjxgait.rendering.plots import plot_run
+
+    return plot_run(folder_of(run), None if out is None else Path(out), formats)
+
+
+def sized(file: Path) -> str:
+    """Return a file with its size in words."""
+    return f"{file} ({file.stat().st_size / 1024:,.0f} KiB)"
+
+
+def folder_of(run: Run | Place) -> Path:
+    """Return the folder of a run."""
+    return run.folder if isinstance(run, Run) else Path(run)
+
+
+def _numbers(walk: "Walk", out: Path) -> str:
+    """Write the walk as numbers; return what was written."""
+    from mjxgait.animation.export.motion import export_motion
+
+    export_motion(walk, out)
+    return f"{walk.seconds:.2f} s at {1 / walk.time_step:.0f} Hz"
+
+
+def _animation(loop: "WalkLoop", character: "Character | None", out: Path, travelling: bool) -> str:
+    """Write the loop; return what was written."""
+    called = _write(loop, character, out, travelling)
+    strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
+    seconds, rate, speed = loop.times[-1], loop.rate, loop.speed
+    return f"{called}{strides}, {seconds:.2f} s at {rate} frames/s, {speed:.2f} m/s"
+
+
+def _check_names(out: Path, onto: Path | None) -> None:
+    """Refuse a kind of file that is not written, and to write over the character."""
+    if (kind := out.suffix.lower()) not in KINDS:
+        raise UserError(f'{out}: cannot write "{out.suffix}"; end the name with {", ".join(KINDS)}')
+    if onto is None:
+        return
+    if kind != ".glb":
+        raise UserError(f"{out}: with --onto a character is written; end the name with .glb")
+    if out.exists() and onto.exists() and out.samefile(onto):
+        raise UserError(f"{out}: is your character, which stays; name another file with --out")
+
+
+def _write(loop: "WalkLoop", character: "Character | None", out: Path, travelling: bool) -> str:
+    """Write the file; return words about the animation on a character."""
+    from mjxgait.animation.export import export_bvh, export_glb, export_onto, export_usd
+
+    if character is not None:
+        return f'animation "{export_onto(loop, character, out, travelling)}", '
+    writers = {".glb": export_glb, ".bvh": export_bvh}
+    writers.get(out.suffix.lower(), export_usd)(loop, out, travelling)
+    return ""
