@@ -15,6 +15,7 @@ from mjxgait.animation.export import (
     stride_in_phase,
     walk_loop,
 )
+from mjxgait.animation.export.footfalls import footfalls
 from mjxgait.animation.export.loop import _straightened
 from mjxgait.creature import Creature
 from mjxgait.rendering.walk import Walk, record_walk
@@ -59,6 +60,19 @@ def test_the_stride_is_the_loop_with_another_start(walk: Walk, stride: WalkLoop)
     assert stride.advance == plain.advance
     at = int(np.abs(plain.qpos[:-1] - stride.qpos[0]).max(1).argmin())
     np.testing.assert_array_equal(np.roll(plain.qpos[:-1], -at, axis=0), stride.qpos[:-1])
+
+
+def test_the_footfalls_of_a_stride_begin_where_it_does(walk: Walk, stride: WalkLoop):
+    """The first foot comes down at its start, as its height from MuJoCo alone says."""
+    plain = footfalls(walk_loop(walk, RATE, most=1))
+    own = [fall for fall in footfalls(stride) if fall.foot == 0]
+    assert len(own) == 1
+    assert min(own[0].down, stride.times[-1] - own[0].down) < 0.05
+    assert own[0].down != next(fall.down for fall in plain if fall.foot == 0)
+    heights, down = foot_heights(stride), np.zeros(len(stride.qpos) - 1, bool)
+    frames = np.arange(np.ceil(own[0].down * RATE), own[0].up * RATE).astype(int)
+    down[frames % len(down)] = True
+    assert heights[:-1][down].max() < heights[:-1][~down].max()
 
 
 def test_all_animations_of_a_file_move_the_same_joints(stride: WalkLoop):

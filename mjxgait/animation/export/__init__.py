@@ -2,6 +2,7 @@
 
 from mjxgait.animation.export.bvh import build_bvh, export_bvh
 from mjxgait.animation.export.character import Character, read_character
+from mjxgait.animation.export.footfalls import contacts
 from mjxgait.animation.export.glb import (
     build_clips,
     build_driven,
@@ -18,11 +19,12 @@ from mjxgait.animation.export.loop import (
     walk_loop,
     walk_take,
 )
-from mjxgait.animation.export.onto import export_onto
+from mjxgait.animation.export.onto import LOOP, export_onto
 from mjxgait.animation.export.usd import export_usd
 from mjxgait.animation.export.viewpoint import viewpoint
 
 __all__ = [
+    "LOOP",
     "RATES",
     "Character",
     "WalkLoop",
@@ -30,6 +32,7 @@ __all__ = [
     "build_clips",
     "build_driven",
     "build_glb",
+    "contacts",
     "export_bvh",
     "export_glb",
     "export_onto",

@@ -31,6 +31,7 @@ def footfalls(loop: WalkLoop) -> list[Footfall]:
     """The footfalls of a loop in the order of `down`; a foot that never leaves has one."""
     walk, (first, last) = loop.walk, loop.frames
     carries = walk.recording.contact[first:last]
+    carries = np.roll(carries, -round(loop.begins * len(carries)), axis=0)
     step = float(loop.times[-1]) / (last - first)
     brief = max(round(BRIEF / step), 1)
     found = [

@@ -28,7 +28,8 @@ class WalkLoop:
     frames/s. strides: in the loop; 0 if it is none. advance: m forward in one loop; the travelling
     walk adds it evenly. stretched: duration over the recorded one. frames: first and last recorded
     frame. turned: rad to the left in one loop, added likewise; in place the creature always looks
-    ahead. path: [F, 2] m in the world, if the root moves unevenly; used in place, too.
+    ahead. path: [F, 2] m in the world, if the root moves unevenly; used in place, too. begins:
+    share of the recorded frames, from the first on, at which the key frames begin.
     """
 
     walk: Walk
@@ -40,6 +41,7 @@ class WalkLoop:
     frames: tuple[int, int]
     turned: float = 0.0
     path: np.ndarray | None = None
+    begins: float = 0.0
 
     @property
     def times(self) -> np.ndarray:
@@ -198,7 +200,9 @@ def stride_in_phase(walk: Walk, rate: int) -> WalkLoop:
         return loop
     at = round((within[0] - first) / (last - first) * count)
     turned = np.roll(loop.qpos[:-1], -at, axis=0)
-    return dataclasses.replace(loop, qpos=np.concatenate([turned, turned[:1]]))
+    return dataclasses.replace(
+        loop, qpos=np.concatenate([turned, turned[:1]]), begins=at % count / count
+    )
 
 
 def falls_of_first_foot(walk: Walk) -> np.ndarray:

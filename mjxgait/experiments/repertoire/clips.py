@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 
 from mjxgait.animation.export import (
+    LOOP,
     WalkLoop,
     build_clips,
+    contacts,
     falls_of_first_foot,
     resampled,
     standing_still,
@@ -216,7 +218,8 @@ def write_clips(
     document["blends"] = [blend.entry for blend in between]
     document["changes"] = [change.entry for change in changed]
     document["transitions"] = [way.entry for way in ways]
-    clips = loops | {way.name: way.loop for way in ways if way.loop is not None}
+    clips = {animation_of(name, loop): loop for name, loop in loops.items()}
+    clips |= {way.name: way.loop for way in ways if way.loop is not None}
     with disk_errors(file.parent):
         write_bytes(file, build_clips(clips, travelling))
         write_text(table, json.dumps(document, indent=2) + "\n")
@@ -245,11 +248,17 @@ def table_of(
     }
 
 
+def animation_of(name: str, loop: WalkLoop) -> str:
+    """Return the name of a clip's animation in the GLB; Godot loops what ends with `LOOP`."""
+    return f"{name}{LOOP}" if loop.strides else name
+
+
 def _entry(name: str, loop: WalkLoop, one: Found | None) -> dict[str, object]:
     """Return a clip's entry. speed, turn: measured, for blending; asked: the cell's targets."""
     duration = float(loop.times[-1])
     entry: dict[str, object] = {
         "name": name,
+        "animation": animation_of(name, loop),
         "speed": round(loop.speed, 4),
         "turn": round(float(np.degrees(loop.turned)) / duration, 3),
         "duration": round(duration, 6),
@@ -265,6 +274,7 @@ def _entry(name: str, loop: WalkLoop, one: Found | None) -> dict[str, object]:
         "gait": one.gait,
         "duty_factor": round(one.duty or 0.0, 4),
         "run": name,
+        "contacts": contacts(loop, loop.walk.creature.feet.names),
     }
 
 

@@ -96,7 +96,9 @@ def test_certified_walks_become_clips_with_table_entries(
     names = [cell.name for cell in CERTIFIED]
     document = gltf.GLTF2.load_from_bytes((folder / table["file"]).read_bytes())
     ways = [f"{names[0]}_start", f"{names[0]}_stop"]
-    assert [animation.name for animation in document.animations] == ["idle", *names, *ways]
+    clips = ["idle", *(f"{name}-loop" for name in names)]
+    assert [animation.name for animation in document.animations] == [*clips, *ways]
+    assert [clip["animation"] for clip in table["clips"]] == clips
     assert [(way["from"], way["to"]) for way in table["transitions"]] == [
         ("idle", names[0]),
         (names[0], "idle"),
@@ -108,6 +110,7 @@ def test_certified_walks_become_clips_with_table_entries(
     assert (straight["turn"], turning["turn"]) == (0.0, pytest.approx(10.0, rel=0.02))
     assert turning["duration"] == pytest.approx(0.5, abs=1 / 60)
     assert turning["duty_factor"] == pytest.approx(0.6)
+    assert {fall["foot"] for fall in turning["contacts"]} <= {n.name for n in document.nodes}
     assert [place["fails"] for place in table["not_certified"]] == [["progress"]] * 4
     assert (folder / "map.png").read_bytes()[:4] == b"\x89PNG"
 
