@@ -11,7 +11,6 @@ import subprocess
 import threading
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO
 
 from .commands import Progress, Step, began, progress_after
 
@@ -34,7 +33,6 @@ class Job:
         self._step: Step | None = None
         self._process: subprocess.Popen[str] | None = None
         self._printed: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._log: IO[str] = open(folder / LOG, "w", encoding="utf-8")
         self._next()
 
     @property
@@ -57,7 +55,8 @@ class Job:
             if line is None:
                 self._ended()
             elif self._step is not None:
-                self._log.write(line)
+                with open(self.folder / LOG, "a", encoding="utf-8") as log:
+                    log.write(line)
                 self._lines.append(line.rstrip())
                 self.progress = progress_after(self.progress, self._step, line)
 
@@ -67,12 +66,10 @@ class Job:
             return
         end_tree(self._process)
         self.cancelled, self._process = True, None
-        self._log.close()
 
     def _next(self) -> None:
         if not self._waiting:
             self._process = None
-            self._log.close()
             return
         self._step, self._lines = self._waiting.pop(0), []
         self.progress = began(self.progress, self._step)
@@ -92,7 +89,6 @@ class Job:
 
     def _fail(self, why: str) -> None:
         self.error, self._process = why, None
-        self._log.close()
 
 
 def error_in(lines: Sequence[str]) -> str:

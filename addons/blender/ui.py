@@ -236,7 +236,9 @@ class Work:
             return self.refuse(job.error)
         armature = bpy.data.objects.get(self._armature)
         if armature is None:
-            return self.refuse(f'"{self._armature}" is gone; its walk is {job.folder / commands.WALK}')
+            return self.refuse(
+                f'"{self._armature}" is gone; its walk is {job.folder / commands.WALK}'
+            )
         try:
             walk = job.folder / commands.WALK
             action, lost = scene.bring_motion(armature, walk, ANIMATION, self.called)

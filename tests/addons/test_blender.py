@@ -97,9 +97,10 @@ def test_every_gait_and_style_of_the_menus_is_known():
 
 
 def test_progress_is_read_from_lines_of_the_program():
+    from rich.console import Console
+
     from mjxgait.config.schema import Config
     from mjxgait.training.screen import Screen
-    from rich.console import Console
 
     config = Config()
     line = {"generation": 15, "best": 2.0, "mean": 1.0, "failures": 3, "episodes": 12,

@@ -1,9 +1,10 @@
-# Drives the walker straight on, then in a curve, then to a stand, and prints what it did as JSON.
+# Drives the walker straight on, slowly in a curve, sharply to the right, and to a stand. Prints what it
+# did as JSON.
 extends Node3D
 
 const STEPS = 60  # of physics per second
-const ASKED = [[0.9, 0.0], [0.5, 10.0], [0.5, -500.0], [0.0, 0.0]]  # of the largest speed; deg/s
-const LONG = 3.0  # s of each
+const ASKED = [[0.9, 0.0], [0.25, 5.0], [0.5, -500.0], [0.0, 0.0]]  # of the largest speed; deg/s
+const LONG = 2.0  # s of each
 
 @onready var walker = $Walker
 var step = 0
