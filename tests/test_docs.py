@@ -54,7 +54,9 @@ def test_the_page_about_python_shows_every_public_name():
     assert sorted(re.findall(r"^::: mjxgait\.(\w+)$", page, re.M)) == sorted(mjxgait.__all__)
 
 
-@pytest.mark.parametrize("folder", ["mjxgait", "scripts", "benchmarks", "configs", "envs", "tests"])
+@pytest.mark.parametrize(
+    "folder", ["mjxgait", "scripts", "benchmarks", "configs", "envs", "tests", "addons"]
+)
 def test_pages_that_files_name_exist(folder: str):
     for file in (ROOT / folder).rglob("*"):
         if file.suffix in (".py", ".toml", ".md", ".c"):

@@ -4,6 +4,7 @@ A job runs in its own process while a timer reads its progress, so Blender stays
 without a window, as a script does, an operator waits for the end.
 """
 
+import dataclasses
 import os
 import tempfile
 import time
@@ -88,12 +89,12 @@ class Settings(bpy.types.PropertyGroup):
     @property
     def choices(self) -> Choices:
         """What is asked, without Blender."""
-        names = [field for field in Choices.__dataclass_fields__ if field not in ("gait", "style")]
-        menus = {
-            name: "" if getattr(self, name) == "NONE" else getattr(self, name)
-            for name in ("gait", "style")
+        asked: dict[str, Any] = {
+            field.name: getattr(self, field.name) for field in dataclasses.fields(Choices)
         }
-        return Choices(**{name: getattr(self, name) for name in names}, **menus)
+        for menu in ("gait", "style"):
+            asked[menu] = "" if asked[menu] == "NONE" else asked[menu]
+        return Choices(**asked)
 
 
 class Preferences(bpy.types.AddonPreferences):
