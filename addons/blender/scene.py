@@ -82,9 +82,9 @@ def bring_motion(armature: Any, file: Path, name: str, called: str) -> tuple[Any
       NotStarted: the file has not this animation.
     """
     scene, was = bpy.context.scene, bpy.context.scene.frame_current
-    with _imported(file) as things:
+    with _imported(file) as (things, actions):
         brought = next((thing for thing in things if thing.type == "ARMATURE"), None)
-        action = next((a for a in bpy.data.actions if a.name.startswith(name)), None)
+        action = next((a for a in actions if a.name.startswith(name)), None)
         if brought is None or action is None:
             raise NotStarted(f'{file}: holds no animation "{name}"')
         _play(brought, action)
@@ -206,8 +206,8 @@ def _play(brought: Any, action: Any) -> None:
 
 
 @contextlib.contextmanager
-def _imported(file: Path) -> Iterator[list[Any]]:
-    """Yield the objects of a file; they and their data are gone after the block."""
+def _imported(file: Path) -> Iterator[tuple[list[Any], list[Any]]]:
+    """Yield the objects and actions of a file; they and their data are gone after the block."""
     before = {kind: set(getattr(bpy.data, kind)) for kind in KINDS}
     with _selected(()):
         try:
@@ -217,7 +217,10 @@ def _imported(file: Path) -> Iterator[list[Any]]:
                 bone_heuristic="BLENDER",
                 disable_bone_shape=True,
             )
-            yield [thing for thing in bpy.data.objects if thing not in before["objects"]]
+            yield (
+                [thing for thing in bpy.data.objects if thing not in before["objects"]],
+                [action for action in bpy.data.actions if action not in before["actions"]],
+            )
         finally:
             new = [d for kind in KINDS for d in set(getattr(bpy.data, kind)) - before[kind]]
             bpy.data.batch_remove(new)

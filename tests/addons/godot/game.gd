@@ -113,7 +113,8 @@ func finish():
 func set_scene():
 	var camera = Camera3D.new()
 	walker.add_child(camera)
-	camera.look_at_from_position(Vector3(1.6, 0.9, 1.0), Vector3(0.0, 0.3, 0.0))
+	camera.look_at_from_position(Vector3(1.1, 0.6, 1.0), Vector3(0.0, 0.32, 0.0))
+	camera.fov = 50.0
 	var sun = DirectionalLight3D.new()
 	add_child(sun)
 	sun.look_at_from_position(Vector3(1.5, 3.0, 2.0), Vector3.ZERO)
@@ -126,6 +127,6 @@ func set_scene():
 	for i in range(-20, 21):
 		var rung = MeshInstance3D.new()
 		rung.mesh = BoxMesh.new()
-		rung.mesh.size = Vector3(40, 0.002, 0.03)
+		rung.mesh.size = Vector3(3, 0.004, 0.03)
 		rung.position.z = 0.5 * i
 		add_child(rung)
