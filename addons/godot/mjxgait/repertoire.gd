@@ -54,7 +54,7 @@ static func place_of(clip: Dictionary) -> Vector2:
 
 # The nearest place to (turn, speed) that the clips reach, in the blend space.
 func nearest(turn: float, speed: float) -> Vector2:
-	var asked = Vector2(turn, speed) / largest
+	var asked = (Vector2(turn, speed) / largest).clamp(-Vector2.ONE, Vector2.ONE)
 	if Geometry2D.is_point_in_polygon(asked, rim):
 		return asked
 	var best = points[0]
