@@ -153,7 +153,7 @@ class Progress:
 
 GENERATION = re.compile(r"generation\s+(\d+)/(\d+)\s.*alive\s+(\d+)%.*steps/s\s+(.+) left")
 VERDICT = re.compile(r"(?:Certified|Not certified)\b.*")
-UNDER_WAY = ("Compiling", "Compiled")
+UNDER_WAY = ("Compiling", "Compiled", "Generation ")
 
 
 def progress_after(before: Progress, step: Step, line: str) -> Progress:
