@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from peers.gait_reward import GaitReward
@@ -198,7 +199,7 @@ def world_of(
         reward = FITNESS * rewards.sum(0)
         if gait is not None:
             reward = GAIT * jax.vmap(gait.of, in_axes=axis)(states, after)
-        return after.replace(reward=reward)
+        return after.replace(reward=jnp.nan_to_num(reward))
 
     def observe(states: State) -> jax.Array:
         see = jax.vmap(lambda obs: network.inputs(split(obs, joints), period), in_axes=axis)
@@ -258,7 +259,7 @@ class Training:
     def _logged(self, iteration: int, found: dict[str, np.ndarray]) -> dict[str, Any]:
         settings = self.bench.agent.settings
         actions = (iteration + 1) * settings.envs * settings.unroll
-        kept = {name: float(value) for name, value in found.items()}
+        kept = {n: float(value) if np.isfinite(value) else None for n, value in found.items()}
         fitness = kept.pop("fitness") if kept["ended"] else None
         line = {
             "generation": iteration,

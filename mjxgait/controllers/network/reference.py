@@ -25,7 +25,7 @@ class NetworkReference:
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
         self.creature, self.every = creature, int(champion.settings.every)
         self.period, self.genome = float(champion.settings.period), champion.genome
-        self.depth = len(champion.settings.hidden) + 1
+        self.depth = len(champion.genome) // 2
 
     def init(self, count: int) -> Memory:
         """See `ReferenceController`."""
