@@ -63,6 +63,7 @@ class GaitReward:
             + 0.02 * (jnp.square(now["pitch_rate"]) + jnp.square(now["roll_rate"]))
             + 0.1 * jnp.sum(jnp.square(now["joint_pos"] - self.creature.joints.stand))
             + 2e-4 * jnp.sum(jnp.square(now["joint_vel"]))
+            + 5e-4 * jnp.sum(jnp.square(now["joint_vel"] - before.data.sensed.joint_vel))
             + 0.3 * slip
         )
         fell = after.done * (1 - after.info["time_out"])

@@ -130,7 +130,7 @@ class Agent:
         one, other = jax.random.split(key)
         policy = network(one, (inputs, *hidden, joints), last=0.01)
         value = network(other, (inputs, *self.settings.value_hidden, 1), last=1.0)
-        deviation = jnp.full(joints, jnp.log(self.settings.deviation))
+        deviation = jnp.full(joints, np.log(self.settings.deviation), jnp.float32)
         optimizer = self._optimizer.init((policy, value, deviation))
         nothing = jnp.zeros(inputs)
         return Learner(policy, value, deviation, optimizer, nothing, nothing + 1, jnp.zeros(()))
