@@ -13,7 +13,8 @@ All that happens in C MuJoCo beside the training, on the CPU. A seed ends at its
 Prints a Markdown table, and writes it after each seed, with everything as JSON:
 
 - wall: s from the start of the seed to its certificate or end, validations and examinations
-  included. compile: s before the first seed; all seeds of a call share the programs.
+  included. processor: the same in s of one core. compile: s before the first seed; all seeds of a
+  call share the programs.
 - steps: millions of control steps, a control step being the physics' own (5 ms).
 - return: mean fitness of the episodes of the last iteration, as evolution counts it.
 - attempts: examinations. margin: of the certificate.
@@ -46,10 +47,17 @@ from mjxgait.evolution.chance import key_of
 from mjxgait.files import write_text
 from mjxgait.simulation.rollout import choose
 from mjxgait.training.advance import versions
-from mjxgait.training.folder import CERTIFICATE, CHAMPION, METRICS, append_lines, create_run
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, append_lines, create_run
 from mjxgait.training.stages import compiler_options, prepare_devices
 
-COLUMNS = "seed", "certified", "wall", "compile", "steps", "return", "attempts", "margin"
+COLUMNS = (
+    *("seed", "certified", "wall", "processor", "compile", "steps", "return"),
+    *("attempts", "margin"),
+)
+TOLD = "seconds", "return", "outcome_forward", "outcome_seconds", "divergence", "deviation"
+"""What is printed of every tenth iteration."""
+LOG = "ppo.jsonl"
+"""File in a run folder with a line per iteration."""
 FITNESS, GAIT = 10.0, 5.0
 """Factors on the rewards: values then have a size of about 1."""
 
@@ -230,7 +238,8 @@ class Training:
 
     def run(self) -> dict[str, Any]:
         """Train until the certificate or the end of the time; return a row of the table."""
-        self.began = looked = time.perf_counter()
+        self.began, worked = time.perf_counter(), time.process_time()
+        looked = self.began
         key, line, looks = key_of(self.seed), {}, None
         learner, states = self.bench.init(key), self.bench.reset(jax.random.fold_in(key, 1))
         with ThreadPoolExecutor(1) as aside:
@@ -250,7 +259,7 @@ class Training:
                     looks = aside.submit(self._look, self._champion(learner, line))
         if self.certificate is None:
             self._look(self._champion(learner, line))
-        return self._row(line)
+        return self._row(line) | {"processor": time.process_time() - worked}
 
     @property
     def seconds(self) -> float:
@@ -263,36 +272,24 @@ class Training:
         kept = {n: float(value) if np.isfinite(value) else None for n, value in found.items()}
         fitness = kept.pop("fitness") if kept["ended"] else None
         line = {
-            "generation": iteration,
-            "best": fitness,
-            "mean": fitness,
-            "forced": False,
+            "iteration": iteration,
+            "return": fitness,
             "seconds": self.seconds,
             "sim_steps": actions * self.bench.network.every,
         } | kept
-        append_lines(self.folder / METRICS, [line])
+        append_lines(self.folder / LOG, [line])
         if iteration % 10 == 0:
-            said = (
-                "seconds",
-                "mean",
-                "outcome_forward",
-                "outcome_seconds",
-                "divergence",
-                "deviation",
-            )
-            print(
-                iteration,
-                {n: round(line[n], 3) for n in said if line.get(n) is not None},
-                flush=True,
-            )
+            print(iteration, {name: cell(line.get(name)) for name in TOLD}, flush=True)
         return line
 
     def _champion(self, learner: Learner, line: dict[str, Any]) -> Champion:
         genome = {name: np.asarray(array) for name, array in learner.actor.items()}
         terms = {n.removeprefix("term_"): v for n, v in line.items() if n.startswith("term_")}
-        origin = {"generation": line["generation"], "seed": self.seed, "versions": versions()}
-        scored = {"fitness": line["mean"] or 0.0, "terms": terms, "origin": origin}
-        return Champion.of(self.creature, self.config, genome, **scored)
+        origin = {"generation": line["iteration"], "seed": self.seed, "versions": versions()}
+        fitness = float(line["return"] or 0.0)
+        return Champion.of(
+            self.creature, self.config, genome, fitness=fitness, terms=terms, origin=origin
+        )
 
     def _look(self, champion: Champion) -> None:
         """Validate a policy, and examine it if it is good enough; see `training.examination`."""
@@ -328,7 +325,7 @@ class Training:
             "certified": self.certificate is not None,
             "wall": self.seconds,
             "steps": line["sim_steps"] / 1e6,
-            "return": line["mean"],
+            "return": line["return"],
             "attempts": self.attempts,
             "margin": self.certificate.margin if self.certificate else None,
             "device": jax.devices()[0].device_kind,

@@ -74,7 +74,7 @@ class Network(RealController):
         here = self._forward(plan, x)
         if not self.creature.mirror.symmetric:
             return here
-        return 0.5 * (here + self.creature.mirror.image(self._forward(plan, self._image(x))))
+        return 0.5 * (here + self._other_side(self._forward(plan, self._image(x))))
 
     def angles(self, outputs: jax.Array) -> jax.Array:
         """Return joint angles [J] in rad: the standing pose at 0, within the pose ranges."""
@@ -84,9 +84,15 @@ class Network(RealController):
 
     def _image(self, x: jax.Array) -> jax.Array:
         """Return the inputs [I] of the mirrored body, half a period later."""
-        joints, mirror = len(self.creature.joints.names), self.creature.mirror
+        joints = len(self.creature.joints.names)
         pos, vel, rest = x[:joints], x[joints : 2 * joints], x[2 * joints :]
-        return jnp.concatenate([mirror.image(pos), mirror.image(vel), np.float32(SIGNS) * rest])
+        signs = jnp.asarray(SIGNS)
+        return jnp.concatenate([self._other_side(pos), self._other_side(vel), signs * rest])
+
+    def _other_side(self, joints: jax.Array) -> jax.Array:
+        """Return values [J] of the joints in the mirror image."""
+        mirror = self.creature.mirror
+        return jnp.asarray(mirror.sign) * joints[mirror.partner]
 
     def _forward(self, plan: Plan, x: jax.Array) -> jax.Array:
         for i in range(len(self.layers)):
