@@ -73,14 +73,18 @@ class Hill:
             pass
 
         jax.tree_util.register_pytree_node(
-            State, lambda s: ((s.x, s.reward, s.metrics), None), lambda _, v: State(x=v[0], reward=v[1], metrics=v[2])
+            State,
+            lambda s: ((s.x, s.reward, s.metrics), None),
+            lambda _, v: State(x=v[0], reward=v[1], metrics=v[2]),
         )
 
         def step(states, actions):
             reward = -jnp.square(actions[:, 0] - 0.5 * states.x)
             return State(x=states.x, reward=reward, metrics={"fitness": reward})
 
-        one = lambda states: jnp.ones_like(states.x)
+        def one(states):
+            return jnp.ones_like(states.x)
+
         return State, World(
             step=step,
             observe=lambda states: states.x[:, None],

@@ -9,5 +9,6 @@ KINDS = (
         controller="controller:Network",
         reference="reference:NetworkReference",
         serializer="serialize:NetworkSerializer",
+        report="report:NetworkView",
     ),
 )

@@ -1,18 +1,22 @@
 """Networks: the two implementations agree, and an environment's policy is the controller."""
 
 import dataclasses
+import io
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import small_config
+from rich.console import Console
 
 from mjxgait.champion import Champion, read_champion, write_champion
 from mjxgait.controllers.key_poses.config import DriveConfig
 from mjxgait.controllers.network.config import MIRRORED, READS, NetworkConfig
 from mjxgait.controllers.network.controller import Network, split
 from mjxgait.controllers.network.reference import NetworkReference
+from mjxgait.controllers.network.report import NetworkView
 from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature
 from mjxgait.environments.problem import make_problem
@@ -119,3 +123,16 @@ def test_weights_of_another_shape_are_refused(champion, stool, tmp_path, name: s
     write_champion(dataclasses.replace(champion, genome=spoilt), stool, tmp_path / "champion.json")
     with pytest.raises(UserError, match=name):
         read_champion(tmp_path / "champion.json", stool)
+
+
+def test_the_report_has_the_layers_and_not_the_weights(genome):
+    snapshot = SimpleNamespace(genomes={n: np.stack([a, 3 * a]) for n, a in genome.items()})
+    view, out = NetworkView(), io.StringIO()
+    found = view.facts(snapshot, 1)
+    assert found["layers"]["weight_1"]["shape"] == [6, 5]
+    size = 3 * np.sqrt(np.square(genome["weight_1"]).mean())
+    assert found["layers"]["weight_1"]["size"] == pytest.approx(size)
+    view.show({"rank": 1, **found}, view.spread(snapshot), Console(file=out, width=80))
+    assert "6 x 5" in out.getvalue()
+    assert f"{size:.3f}" in out.getvalue()
+    assert f"{size / 3:.3f}" in out.getvalue().partition("spread over the population")[2]
