@@ -108,9 +108,7 @@ class Environment:
 
     def begin(self, trial: Starts) -> State:
         """Return the state at the start of a given trial []."""
-        data, verdict = on_lanes(self._begun, self.plant.lane_axis)(self._numbered(trial))
-        info = {"reason": verdict.reason, "time_out": verdict.time_out}
-        return State(data, verdict.obs, verdict.reward, verdict.done, verdict.metrics, info)
+        return _first(*on_lanes(self._begun, self.plant.lane_axis)(self._numbered(trial)))
 
     def step(self, state: State, action: jax.Array) -> State:
         """Return the state one control step later, under an action [J] in -1 to 1.
@@ -118,10 +116,24 @@ class Environment:
         An episode that has ended stays as it is, with reward 0, though its body moves on.
         """
         stepped = on_lanes(self._stepped, self.plant.lane_axis)
-        data, verdict = stepped(state.data, jnp.asarray(action, jnp.float32))
-        info = {**state.info, "reason": verdict.reason, "time_out": verdict.time_out}
-        metrics = {**state.metrics, **verdict.metrics}
-        return State(data, verdict.obs, verdict.reward, verdict.done, metrics, info)
+        return _next(state, *stepped(state.data, jnp.asarray(action, jnp.float32)))
+
+    def reset_lanes(self, keys: jax.Array) -> State:
+        """Return the states at the start of episodes, with keys [B] and B at `plant.lane_axis`.
+
+        This and `step_lanes` compute what `jax.vmap` of `reset` and `step` does, faster: nothing is
+        moved to and fro between steps, and on a CPU a step is one kernel.
+        """
+        return self.begin_lanes(jax.vmap(self.problem.trial)(keys))
+
+    def begin_lanes(self, trials: Starts) -> State:
+        """Return the states at the start of given trials [B], with B at `plant.lane_axis`."""
+        numbered = jax.vmap(self._numbered, out_axes=self.plant.lane_axis)(trials)
+        return _first(*self._begun(numbered))
+
+    def step_lanes(self, states: State, actions: jax.Array) -> State:
+        """Return the states one control step later; B is at `plant.lane_axis` of every leaf."""
+        return _next(states, *self._stepped(states.data, jnp.asarray(actions, jnp.float32)))
 
     @property
     def _drive(self) -> Drive:
@@ -182,6 +194,17 @@ class Environment:
 
     def _per_lane(self, function: Callable[..., Any]) -> Callable[..., Any]:
         return per_lane(self.plant, function)
+
+
+def _first(data: Data, verdict: Verdict) -> State:
+    info = {"reason": verdict.reason, "time_out": verdict.time_out}
+    return State(data, verdict.obs, verdict.reward, verdict.done, verdict.metrics, info)
+
+
+def _next(before: State, data: Data, verdict: Verdict) -> State:
+    info = {**before.info, "reason": verdict.reason, "time_out": verdict.time_out}
+    metrics = {**before.metrics, **verdict.metrics}
+    return State(data, verdict.obs, verdict.reward, verdict.done, metrics, info)
 
 
 def on_lanes(function: Callable[..., Any], axis: int) -> Callable[..., Any]:

@@ -101,6 +101,10 @@ FORMS: dict[str, Given] = {
     "keyed.py": lambda folder: [
         *("keyed", "--only", "short trot", "--population", "4", "--generations", "1")
     ],
+    "ppo.py": lambda folder: [
+        *(*STOOLS, "--out", "out", "--envs", "4", "--unroll", "2", "--minibatches", "1"),
+        *("--hidden", "4", "--every", "1", "--iterations", "1"),
+    ],
     "overlap.py": lambda folder: [str(walker(folder / "run"))],
     "raise.py": lambda folder: [str(faller(folder / "run")), "--starts", "4"],
     "rows.py": lambda folder: [
@@ -132,6 +136,7 @@ LONG = (
     "interruptions.py",
     "islands.py",
     "keyed.py",
+    "ppo.py",
     "raise.py",
     "rows.py",
     "store_walk.py",
