@@ -9,7 +9,7 @@ import trimesh
 from importer.models import BIPED
 from trimesh.exchange.dae import export_collada
 
-from mjxgait.cli.import_ import write_folder
+from mjxgait.api.bodies import write_folder
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, Imported, import_model, stance

@@ -1,8 +1,8 @@
 """`--physics mjx` trains with MJX, in every command that simulates."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from helpers import STOOL, said_by, short_examination
 from mjxgait.api.repertoires import RepertoireRequest, planned
 from mjxgait.cli.refine import refine_command
 from mjxgait.cli.train import train_command
+from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.experiments.ablation.plan import make_plan, read_study
 from mjxgait.training.folder import open_run
@@ -85,8 +86,10 @@ def test_refining_a_cycle_accepts_mjx(
 ):
     file = write(tmp_path, "csv", stool, swings(stool))
 
-    def only_written(*given: Any) -> int:
-        given[-1]()
+    def only_written(
+        folder: Path, creature: Creature, config: Config, write: Callable[[], object], quiet: bool
+    ) -> int:
+        write()
         return 0
 
     monkeypatch.setattr("mjxgait.cli.refine._run", only_written)
