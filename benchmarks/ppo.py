@@ -54,7 +54,7 @@ COLUMNS = (
     *("seed", "certified", "wall", "processor", "compile", "steps", "return"),
     *("attempts", "margin"),
 )
-TOLD = "seconds", "return", "outcome_forward", "outcome_seconds", "divergence", "deviation"
+SHOWN = "seconds", "return", "outcome_forward", "outcome_seconds", "divergence", "deviation"
 """What is printed of every tenth iteration."""
 LOG = "ppo.jsonl"
 """File in a run folder with a line per iteration."""
@@ -279,7 +279,7 @@ class Training:
         } | kept
         append_lines(self.folder / LOG, [line])
         if iteration % 10 == 0:
-            print(iteration, {name: cell(line.get(name)) for name in TOLD}, flush=True)
+            print(iteration, {name: cell(line.get(name)) for name in SHOWN}, flush=True)
         return line
 
     def _champion(self, learner: Learner, line: dict[str, Any]) -> Champion:

@@ -80,7 +80,7 @@ def nearest_rate(frames_per_s: float) -> int:
 
 def walk_steps(program: str, folder: Path, choices: Choices, rate: int) -> tuple[Step, ...]:
     """Return the commands that make the character in the folder walk."""
-    asked = _options(
+    options = _options(
         {
             "--speed": f"{choices.speed:.4g}bl/s" if choices.speed else "",
             "--gait": choices.gait,
@@ -88,7 +88,7 @@ def walk_steps(program: str, folder: Path, choices: Choices, rate: int) -> tuple
             "--turn": f"{choices.turn:.4g}" if choices.turn else "",
         }
     )
-    words = ["train", "--env", str(folder / CREATURE), "--no-plots", *asked]
+    words = ["train", "--env", str(folder / CREATURE), "--no-plots", *options]
     return _steps(program, folder, choices, rate, ("Evolving a walk", words))
 
 

@@ -71,13 +71,13 @@ class Settings(bpy.types.PropertyGroup):
 
     @property
     def choices(self) -> Choices:
-        """What is asked, without Blender."""
-        asked: dict[str, Any] = {
+        """Chosen settings, without Blender."""
+        chosen: dict[str, Any] = {
             field.name: getattr(self, field.name) for field in dataclasses.fields(Choices)
         }
         for menu in ("gait", "style"):
-            asked[menu] = "" if asked[menu] == "NONE" else asked[menu]
-        return Choices(**asked)
+            chosen[menu] = "" if chosen[menu] == "NONE" else chosen[menu]
+        return Choices(**chosen)
 
 
 class Preferences(bpy.types.AddonPreferences):

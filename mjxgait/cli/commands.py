@@ -42,6 +42,9 @@ COMMANDS = {
         "compare settings over seeds, with error bars",
         "mjxgait ablate forced_evolution --out DIR",
     ),
+    "leaderboard": Command(
+        "success rates per creature, task and algorithm", "mjxgait leaderboard add RUN"
+    ),
     "list": Command("list the shipped creatures, configurations, tasks, gaits", "mjxgait list"),
     "doctor": Command("tell whether a run would work on this machine", "mjxgait doctor"),
     "cache": Command("show or clear the compiled programs", "mjxgait cache"),

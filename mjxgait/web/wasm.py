@@ -107,14 +107,14 @@ def _pack(npm: str, work: str) -> None:
             timeout=PATIENCE,
         )
     except subprocess.TimeoutExpired:
-        told = f"no answer in {PATIENCE:.0f} s"
+        reason = f"no answer in {PATIENCE:.0f} s"
     else:
         if done.returncode == 0 and any(Path(work).glob("*.tgz")):
             return
         lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
-        told = lines[0] if lines else f"exit code {done.returncode}"
+        reason = lines[0] if lines else f"exit code {done.returncode}"
     raise UserError(
-        f"npm could not fetch {PACKAGE} {VERSION} ({told}); try again with a network, or {BY_HAND}"
+        f"npm could not fetch {PACKAGE} {VERSION} ({reason}); try again with a network, or {BY_HAND}"
     )
 
 

@@ -12,6 +12,7 @@ from end_to_end.walks import short_examination, small_settings, trained, walker
 from helpers import STOOL, said_by
 from web.engine import engine_folder
 
+from mjxgait.api import certify
 from mjxgait.certification import read_certificate
 from mjxgait.cli import COMMANDS
 from mjxgait.creature import load_creature
@@ -59,6 +60,12 @@ def gathered(folder: Path) -> tuple[list[str], str]:
     return given, "set/map.png"
 
 
+def ranked(folder: Path) -> tuple[list[str], str]:
+    run = walker(folder / "run")
+    certify(run)
+    return ["add", str(run), "--board", "board.jsonl"], "board.jsonl"
+
+
 FORMS: dict[str, list[Made]] = {
     "refine": [refined],
     "certify": [examined],
@@ -78,6 +85,7 @@ FORMS: dict[str, list[Made]] = {
     "check": [
         lambda folder, name=name: ([name, "--out", "seen.png"], "seen.png") for name in CREATURES
     ],
+    "leaderboard": [ranked, lambda folder: ([], "")],
     "list": [lambda folder: ([], "")],
     "doctor": [lambda folder: ([], "")],
     "cache": [lambda folder: ([], ""), lambda folder: (["show"], "")],

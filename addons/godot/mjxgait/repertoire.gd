@@ -54,13 +54,13 @@ static func place_of(clip: Dictionary) -> Vector2:
 
 # The nearest place to (turn, speed) that the clips reach, in the blend space.
 func nearest(turn: float, speed: float) -> Vector2:
-	var asked = (Vector2(turn, speed) / largest).clamp(-Vector2.ONE, Vector2.ONE)
-	if Geometry2D.is_point_in_polygon(asked, rim):
-		return asked
+	var wanted = (Vector2(turn, speed) / largest).clamp(-Vector2.ONE, Vector2.ONE)
+	if Geometry2D.is_point_in_polygon(wanted, rim):
+		return wanted
 	var best = points[0]
 	for i in rim.size() - 1:  # the last point is the first
-		var near = Geometry2D.get_closest_point_to_segment(asked, rim[i], rim[i + 1])
-		if near.distance_squared_to(asked) < best.distance_squared_to(asked):
+		var near = Geometry2D.get_closest_point_to_segment(wanted, rim[i], rim[i + 1])
+		if near.distance_squared_to(wanted) < best.distance_squared_to(wanted):
 			best = near
 	return best
 

@@ -10,5 +10,6 @@ KINDS = (
         reference="reference:NetworkReference",
         serializer="serialize:NetworkSerializer",
         report="report:NetworkView",
+        what="a small neural network, as reinforcement learning trains it",
     ),
 )
