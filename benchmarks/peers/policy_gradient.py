@@ -126,7 +126,7 @@ class Agent:
         )
 
     def init(self, key: jax.Array, inputs: int, hidden: tuple[int, ...], joints: int) -> Learner:
-        """Return a learner whose policy hardly moves."""
+        """Return a learner with a policy that hardly moves."""
         one, other = jax.random.split(key)
         policy = network(one, (inputs, *hidden, joints), last=0.01)
         value = network(other, (inputs, *self.settings.value_hidden, 1), last=1.0)

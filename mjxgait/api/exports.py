@@ -109,8 +109,7 @@ def _write_page(folder: Path, file: Path, physics: bool, wasm: Path | None) -> s
     repertoire = (folder / GRID).is_file()
     if physics and repertoire:
         raise UserError(
-            f"{folder}: a repertoire, whose page plays animation; name one of its runs for "
-            "--physics"
+            f"{folder}: a repertoire; its page plays animation. Name one of its runs for --physics"
         )
     if physics:
         return write_physics_page(folder, file, wasm)

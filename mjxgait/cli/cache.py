@@ -15,7 +15,7 @@ from mjxgait.errors import UserError
 class CacheOptions:
     """Show the folder of compiled programs and its size, or clear it.
 
-    A run whose programs are there compiles nothing; after `clear` it compiles again.
+    A run compiles nothing if its programs are there; after `clear` it compiles again.
 
     Attributes:
       action: clear removes the programs.

@@ -88,7 +88,7 @@ def described(cls: type, command: str) -> str:
 
 
 def _sentence(framed: str) -> str:
-    """Return the error in tyro's frame, whose first line is a title, as one sentence."""
+    """Return the error in tyro's frame, below its title, as one sentence."""
     lines: list[str] = []
     near: list[str] | None = None
     for line in framed.splitlines()[1:]:

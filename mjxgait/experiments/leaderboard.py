@@ -34,7 +34,7 @@ class Entry:
 
     Attributes:
       creature, body: its name and digest.
-      task, algorithm, machine: the last two in the words of the person who adds the run.
+      task, algorithm, machine: the last two as stated when the run was added.
       seed: of the run.
       champion: fingerprint of the examined individual.
       certified, margin: result of the examination by the shipped rules; None for no finite margin.

@@ -24,16 +24,15 @@ def add_bones(spec: mujoco.MjSpec, notes: Notes) -> None:
     """Add a capsule, which is only drawn, along the bone of each moving part without any shape.
 
     A bone leads from joint to joint, or through the centre of mass where no joint follows. A part
-    whose joints are all at one place, such as the cross of a hip, has none.
+    with all joints at one place, such as the cross of a hip, has none.
     """
     bodies = spec.bodies[1:]
     least = LEAST_SHARE * sum(body.mass for body in bodies)
     moving = [body for body in bodies if body.joints and _mass(body) >= least]
     bare = [body for body in moving if not any(map(_has_shape, _rigid(body)))]
-    bones = {body.name: bone for body in bare if (bone := _bone(body))}
-    for body in bare:
-        if body.name in bones:
-            mark(bones[body.name].added(body), solid=False, seen=True)
+    bones = {body.name: bone.added(body) for body in bare if (bone := _bone(body))}
+    for geom in bones.values():
+        mark(geom, solid=False, seen=True)
     if bones:
         notes.change(
             f"capsules for {listed(list(bones))}",

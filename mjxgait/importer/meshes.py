@@ -39,6 +39,9 @@ def convert(assets: dict[str, bytes], failed: Callable[[str, str], object]) -> N
 def converted(data: bytes, suffix: str) -> bytes:
     """Return a mesh as the text of an OBJ file, in m; the parts of a scene become one.
 
+    The unit of a COLLADA file counts, its up axis does not: a link has the axes of its mesh, as in
+    robot viewers.
+
     Raises:
       ValueError: no triangles, too many, or a coordinate that is not finite. Others: damaged.
     """
@@ -48,9 +51,11 @@ def converted(data: bytes, suffix: str) -> bytes:
     scene = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], resolver=None)
     parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
     _check(parts)
+    for part in parts:
+        if part.units:
+            part.convert_units("meters")
     mesh = trimesh.util.concatenate(parts)
     assert isinstance(mesh, trimesh.Trimesh)
-    mesh.apply_scale(_unit(data) if suffix == ".dae" else 1.0)
     plain = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     text = export_obj(plain, include_normals=False, include_color=False, include_texture=False)
     return str(text).encode()
@@ -62,15 +67,3 @@ def _check(parts: "Sequence[trimesh.Trimesh]") -> None:
         raise ValueError(f"{faces} triangles; 1 to {MOST_FACES} are read")
     if not all(math.isfinite(float(abs(part.vertices).max())) for part in parts):
         raise ValueError("a coordinate is not finite")
-
-
-def _unit(data: bytes) -> float:
-    """Return the unit of length in m that a COLLADA file states.
-
-    Its up axis is ignored, as robot viewers do: a link has the axes of its mesh.
-    """
-    import collada
-
-    ignored = [collada.common.DaeError]
-    unit = collada.Collada(io.BytesIO(data), ignore=ignored).assetInfo.unitmeter
-    return 1.0 if unit is None else float(unit)

@@ -1,4 +1,4 @@
-"""Controller whose genome is the weights of a neural network (docs/reference/network.md).
+"""Controller with the weights of a neural network as genome (docs/reference/network.md).
 
 On a symmetric body the network is applied to the observations and to their mirror image half a
 period later, and the command is the mean of both: so the left side does what the right side does.
