@@ -159,5 +159,5 @@ def test_contradicting_options_are_refused(stool, tmp_path, capsys):
     assert "add --physics" in said_by(capsys, "share", run, "--out", out, "--wasm", run, code=2)
     (run / GRID).write_text("{}")
     said = said_by(capsys, "share", run, "--out", out, "--physics", code=2)
-    assert "name one of its runs" in said
+    assert "Name one of its runs" in said
     assert not out.exists()
