@@ -183,29 +183,3 @@ def test_help_covers_the_public_api():
         assert pydoc.getdoc(getattr(mjxgait, name))
     for words in ("train(", "generations:", "Raises:", "mjxgait.walk(run)"):
         assert words in text
-
-
-NOTEBOOK = Path(__file__).parents[2] / "docs" / "guide" / "walk.ipynb"
-FIRST = 'CREATURE, SETTINGS = "tall_quadruped", {}'
-
-
-def test_the_notebook_runs(tmp_path: Path, monkeypatch, capsys):
-    """All cells run in order, on a small body and for a short time."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    monkeypatch.chdir(tmp_path)
-    small = {**SMALL, "evolution": {"population": 6, "generations": 2}}
-    cells = [
-        "".join(cell["source"])
-        for cell in json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
-        if cell["cell_type"] == "code"
-    ]
-    assert FIRST in cells[0]
-    names: dict[str, object] = {}
-    for cell in cells:
-        exec(cell.replace(FIRST, f"CREATURE, SETTINGS = {str(STOOL)!r}, {small!r}"), names)
-    assert (tmp_path / "runs" / "notebook" / "champion.json").exists()
-    said = capsys.readouterr().out
-    assert "1 stays up" in said
-    assert "hips at 0.30 and 0.36 m" in said

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from animation.keys.made import columns, swings
 from end_to_end.shipped import CONFIGS, CREATURES, ROOT, STUDIES, STYLES, TASKS
-from end_to_end.walks import short_examination, small_settings, trained, walker
+from end_to_end.walks import faller, short_examination, small_settings, trained, walker
 from helpers import STOOL, said_by
 from web.engine import engine_folder
 
@@ -61,7 +61,7 @@ def gathered(folder: Path) -> tuple[list[str], str]:
 
 
 def ranked(folder: Path) -> tuple[list[str], str]:
-    run = walker(folder / "run")
+    run = faller(folder / "run")
     certify(run)
     return ["add", str(run), "--board", "board.jsonl"], "board.jsonl"
 
