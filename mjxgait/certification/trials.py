@@ -6,11 +6,9 @@ Evolution therefore cannot tune for it, and every examination of a champion uses
 Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps.
 """
 
-import concurrent.futures
 import dataclasses
 import math
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -22,7 +20,7 @@ from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.processes import cores
 from mjxgait.reference.controllers import ReferenceController
-from mjxgait.reference.outcome import Fall, Outcome, Trajectory, Watch
+from mjxgait.reference.outcome import Fall, Outcome, Watch
 from mjxgait.reference.starts import Starts, join, perturbed_starts, pushed_starts, unfamiliar
 from mjxgait.reference.stepping import Stepping
 
@@ -124,13 +122,9 @@ def simulate(
         mostly straight ahead.
       threads: 0 takes the machine's cores. The result does not depend on it.
       watch: receives the simulations that can no longer succeed, and ends all once that decides
-        the result. The distances until then do depend on threads.
-      reference: replaces the champion's own reference controller. One that treats simulations
-        differently needs a single thread.
+        the result.
+      reference: replaces the champion's own reference controller.
     """
-    threads = threads or cores()
-    # Interleaved, so that each thread gets its share of every kind of start.
-    shares = [np.arange(i, len(starts), threads) for i in range(min(threads, len(starts)))]
     steps = round(seconds / creature.model.opt.timestep)
     task = how_simulated(champion.task, champion.wish)
     fall = fall or task.fall(CertificateConfig())
@@ -138,32 +132,10 @@ def simulate(
     if heading is None:
         heading = task.commanded_heading(steps, creature.model.opt.timestep)
     commanded = None if heading is None else np.broadcast_to(heading, (len(starts), steps))
-
-    def run(share: np.ndarray) -> Outcome:
-        mine, kept = starts.rows(share), int((share < record).sum())
-        stepping = Stepping(creature, champion, mine, kept, fall, task, reference)
-        tell = None if watch is None else partial(watch.tell, share)
-        return stepping.to_the_end(steps, None if commanded is None else commanded[share], tell)
-
-    with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
-        parts = list(pool.map(run, shares))
-    order = np.argsort(np.concatenate(shares))
-    kept = np.argsort(np.concatenate([share[share < record] for share in shares]))
-    fields = ("qpos", "qvel", "torque", "target", "phase")
-    return Outcome(
-        fell=np.concatenate([p.fell for p in parts])[order],
-        travel=np.concatenate([p.travel for p in parts])[order],
-        path=np.concatenate([p.path for p in parts])[order],
-        aside=np.concatenate([p.aside for p in parts])[order],
-        clearance=np.concatenate([p.clearance for p in parts])[order],
-        astray=np.concatenate([p.astray for p in parts])[order],
-        middle=np.concatenate([p.middle for p in parts])[order],
-        low=np.concatenate([p.low for p in parts])[order],
-        trajectory=Trajectory(
-            creature.model.opt.timestep,
-            *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),
-        ),
+    stepping = Stepping(
+        creature, champion, starts, record, fall, task, reference, threads=threads or cores()
     )
+    return stepping.to_the_end(steps, commanded, None if watch is None else watch.tell)
 
 
 def told_to_turn(

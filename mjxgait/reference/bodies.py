@@ -1,4 +1,4 @@
-"""Bodies that one thread simulates on C MuJoCo: arrays, observations, falls, water.
+"""Bodies simulated on C MuJoCo: arrays, observations, falls, water.
 
 Water is written from docs/reference/modular-bodies.md. Letters: `S` simulations, `J` actuated
 joints, `F` feet, `nq nv` as in MuJoCo, `B` blocks, `Q` points of a block's faces.
@@ -109,7 +109,7 @@ class Bodies:
     """Simulations at their initial conditions; on land each is raised out of the floor.
 
     reads: observations that the controller reads; others are not computed. drag: N·s/m³ of the
-    water, 0 on land.
+    water, 0 on land. threads: of the physics.
     """
 
     def __init__(
@@ -119,10 +119,11 @@ class Bodies:
         starts: Starts,
         reads: Collection[str],
         drag: float,
+        threads: int = 1,
     ) -> None:
         self.creature, self.starts = creature, starts
         self.start, self.terrain = start_frame(creature), terrain_of(creature)
-        self.batch, self.layout = batch_of(creature, model, starts), Layout(model)
+        self.batch, self.layout = batch_of(creature, model, starts, threads), Layout(model)
         feet, watched = creature.feet, len(creature.feet.foot_of)
         self.solid = LowestPoint(model, colliding_geoms(model), self.terrain)
         self.feet = LowestPoint(model, feet.watched[:watched], self.terrain)

@@ -133,7 +133,7 @@ def blank_outcome(
 
 
 class Watch:
-    """Lost simulations, shared by all threads that step them.
+    """Lost simulations of one call of `simulate`.
 
     lost: [S] whether one can no longer succeed. over: whether the result is decided.
     """
@@ -143,8 +143,8 @@ class Watch:
         self.lost, self.over = np.zeros(count, bool), False
         self._hopeless = hopeless
 
-    def tell(self, rows: np.ndarray, lost: np.ndarray) -> bool:
-        """Record the lost simulations among some rows; return whether all may end."""
-        self.lost[rows] |= lost
+    def tell(self, lost: np.ndarray) -> bool:
+        """Record the lost simulations [S]; return whether all may end."""
+        self.lost |= lost
         self.over = self.over or self._hopeless(self.lost)
         return self.over

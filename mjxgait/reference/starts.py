@@ -176,9 +176,9 @@ def pushed_starts(
     )
 
 
-def batch_of(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:
+def batch_of(creature: Creature, model: mujoco.MjModel, starts: Starts, threads: int = 1) -> Batch:
     """Return the simulations at their initial conditions."""
-    batch = Batch(model, len(starts), 1, persistent=True)
+    batch = Batch(model, len(starts), min(threads, len(starts)), persistent=True)
     batch.expand("geom_friction")[:, :, 0] *= starts.friction[:, None]
     batch.expand("body_mass")[:] *= starts.mass
     batch.expand("body_inertia")[:] *= starts.mass[:, :, None]

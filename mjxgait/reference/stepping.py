@@ -1,4 +1,4 @@
-"""Simulations of one thread on C MuJoCo, under the champion's reference controller.
+"""Simulations on C MuJoCo, under the champion's reference controller.
 
 Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps, `J` actuated
 joints, `nq nv` as in MuJoCo.
@@ -19,7 +19,6 @@ from mjxgait.reference.layout import Clearance
 from mjxgait.reference.outcome import (
     Fall,
     Outcome,
-    Trajectory,
     blank_film,
     blank_outcome,
 )
@@ -58,7 +57,7 @@ class Around(Protocol):
 
 
 class Stepping:
-    """Simulations of one thread; the first `record` of them are recorded."""
+    """Simulations; the first `record` of them are recorded."""
 
     def __init__(
         self,
@@ -69,6 +68,7 @@ class Stepping:
         fall: Fall,
         task: Around,
         reference: ReferenceController | None = None,
+        threads: int = 1,
     ) -> None:
         self.creature, self.starts, self.fall = creature, starts, fall
         self.record, self.goal, self.task = record, starts.goal.copy(), task
@@ -76,11 +76,12 @@ class Stepping:
         self.reference = reference or reference_of(creature, champion, step)
         self.drive = Drive(creature, champion.drive, self.reference.command, step)
         model = examined_model(creature)
-        self.bodies = Bodies(creature, model, starts, self.reference.reads, task.drag)
+        self.bodies = Bodies(creature, model, starts, self.reference.reads, task.drag, threads)
         self.memory = dict(self.reference.init(len(starts)))
         self.command = np.zeros_like(starts.stiffness)
         self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
         self.finest = int(starts.refine.max())
+        self.push_step = np.floor(starts.push_time / step)
         # The latest torques, for simulations with a delay.
         self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
 
@@ -100,6 +101,7 @@ class Stepping:
         commanded = heading is not None
         middle, low = self.task.grown, self.task.leaps
         seen = blank_outcome(count, steps, film, commanded=commanded, middle=middle, low=low)
+        seen.travel[:] = self.bodies.travel(np.arange(count))
         leader, waiting = self._alike(heading)
         running = np.setdiff1d(np.arange(count), waiting)
         for k in range(steps):
@@ -107,16 +109,16 @@ class Stepping:
                 break
             if tell is not None and k % LOOK == 0 and tell(self.task.lost(seen, self.starts, k)):
                 break
-            if len(waiting) and np.isinf(seen.fell[leader]):
-                released = waiting[self._pushed(waiting, k)]
+            released = waiting[self.push_step[waiting] == k]
+            if len(released) and np.isinf(seen.fell[leader]):
                 self._follow(released, leader)
                 seen.copy(leader, released)
                 running, waiting = np.union1d(running, released), np.setdiff1d(waiting, released)
-            pushed = running[self._pushed(running, k)]
+            pushed = running[self.push_step[running] == k]
             if len(pushed):
                 self.bodies.push(pushed)
             wanted = None if heading is None else heading[running, k]
-            self._control_step(running, k, wanted, film)
+            self._control_step(running, k, wanted, seen)
             down = self._watch(seen, running, k, wanted)
             watched = (k + 1) * time_step < self.starts.end[running]
             if down.any() or not watched.all():
@@ -173,27 +175,32 @@ class Stepping:
         self.sent[:, rows] = self.sent[:, [leader]]
 
     def _control_step(
-        self, running: np.ndarray, k: int, heading: np.ndarray | None, film: Trajectory
+        self, running: np.ndarray, k: int, heading: np.ndarray | None, seen: Outcome
     ) -> None:
-        kept = running[running < self.record]
-        film.qpos[kept, k], film.qvel[kept, k] = self.bodies.qpos[kept], self.bodies.qvel[kept]
-        film.phase[kept, k] = self.reference.phase({n: m[kept] for n, m in self.memory.items()})
-        command, torque = self._physics_step(running, k, heading)
-        film.torque[kept, k] = torque[: len(kept)]
-        if self.reference.command == "pose":
-            film.target[kept, k] = command[: len(kept)]
+        kept, film = running[running < self.record], seen.trajectory
+        if len(kept):
+            film.qpos[kept, k], film.qvel[kept, k] = self.bodies.qpos[kept], self.bodies.qvel[kept]
+            film.phase[kept, k] = self.reference.phase({n: m[kept] for n, m in self.memory.items()})
+        command, torque = self._physics_step(running, k, heading, seen.travel[running, 0])
+        if len(kept):
+            film.torque[kept, k] = torque[: len(kept)]
+            if self.reference.command == "pose":
+                film.target[kept, k] = command[: len(kept)]
         for taken in range(1, self.finest):
             self.bodies.step(running[self.starts.refine[running] > taken])
 
     def _physics_step(
-        self, running: np.ndarray, k: int, heading: np.ndarray | None
+        self, running: np.ndarray, k: int, heading: np.ndarray | None, way: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the command and the torque that acts, [running, J] each."""
+        """Return the command and the torque that acts, [running, J] each.
+
+        way: [running] m forward so far.
+        """
         state, starts = self.bodies.state(running, k, self.goal[running]), self.starts
         if k % self.reference.every == 0:
             self.command[running] = self._act(running, state, heading)
         command = self.command[running]
-        first, way = self.starts.goal[running], self.bodies.travel(running)[:, 0]
+        first = self.starts.goal[running]
         self.goal[running] = self.task.next_goal(self.goal[running], first, way)
         self.sent[k % len(self.sent), running] = self.drive.torque(
             command, state, starts.stiffness[running], starts.damping[running]
@@ -218,8 +225,3 @@ class Stepping:
         for name, values in after.items():
             self.memory[name][running] = values
         return command
-
-    def _pushed(self, rows: np.ndarray, k: int) -> np.ndarray:
-        """Return which of some simulations are pushed at a step."""
-        time_step = self.creature.model.opt.timestep
-        return np.floor(self.starts.push_time[rows] / time_step) == k

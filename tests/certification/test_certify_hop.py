@@ -211,7 +211,7 @@ def test_the_trial_run_ends_if_the_wanted_margin_is_out_of_reach(
         **_: Any,
     ):
         for fallen in range(failing + 1):
-            if watch.tell(np.arange(64), np.arange(64) < fallen):
+            if watch.tell(np.arange(64) < fallen):
                 told.append(fallen)
                 break
         fell = np.where(np.arange(64) < failing, 1.0, np.inf)
