@@ -106,10 +106,8 @@ def narrowed(box: Box, share: jax.Array | float) -> Box:
 def in_ranges(genomes: object, box: Box) -> np.ndarray:
     """Return genomes [N, ...] as rows [N, genes], each gene in units of its range."""
     scaled = jax.tree.map(
-        lambda leaf, low, high: np.asarray((leaf - low) / jnp.maximum(high - low, 1e-9)),
-        genomes,
-        box.low,
-        box.high,
+        lambda leaf, low, high: (leaf - low) / np.maximum(high - low, np.float32(1e-9)),
+        *jax.device_get((genomes, box.low, box.high)),
     )
     return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in jax.tree.leaves(scaled)], 1)
 

@@ -28,7 +28,7 @@ class Generations:
     def __init__(self, step: Step, batch: Batch, states: EvolutionState) -> None:
         self._step, self._batch = step, batch
         self.states = batch.place(states)
-        self.generation = int(np.max(states.generation))
+        self.generation = int(np.max(jax.device_get(states.generation)))
         self.seconds, self.steps = 0.0, 0
 
     def advance(self) -> list[Line]:

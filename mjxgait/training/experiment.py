@@ -33,6 +33,7 @@ from mjxgait.training.stages import (
     everywhere,
     lower_stages,
     lowered,
+    stacked,
 )
 from mjxgait.types import RequestedTrials, Tree, by_name
 
@@ -192,11 +193,11 @@ class Batch:
     @cached_property
     def rows(self) -> RunParams:
         """Settings and starts, leaves [B, ...]."""
-        return _stack([experiment.row for experiment in self.experiments])
+        return stacked([experiment.row for experiment in self.experiments])
 
     def init(self) -> EvolutionState:
         """Return the states before the first evaluation, leaves [B, ...]."""
-        return _stack([experiment.init() for experiment in self.experiments])
+        return stacked([experiment.init() for experiment in self.experiments])
 
     def abstract(self) -> EvolutionState:
         """Return the shapes and types of the states."""
@@ -313,13 +314,9 @@ def _experiment(creature: Creature, spec: SimulatorSpec, config: Config) -> Expe
 
 def one_row(tree: Tree) -> Tree:
     """Add an axis of one row [1, ...] to all leaves."""
-    return jax.tree.map(lambda leaf: leaf[None], tree)
+    return stacked([tree])
 
 
 def row_of(tree: Tree, row: int = 0) -> Tree:
     """Return one row of leaves [B, ...]."""
     return jax.tree.map(lambda leaf: leaf[row], tree)
-
-
-def _stack(trees: Sequence[Tree]) -> Tree:
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)

@@ -7,12 +7,13 @@ import contextlib
 import dataclasses
 import functools
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from typing import Literal
 
 import jax
+import jax.numpy as jnp
 from jax.sharding import NamedSharding, PartitionSpec
 
 from mjxgait.cache import own_folder
@@ -33,7 +34,7 @@ from mjxgait.training.generation import (
     propose,
 )
 from mjxgait.training.spec import BodyParams, SimulatorSpec
-from mjxgait.types import Evaluation, RequestedTrials
+from mjxgait.types import Evaluation, RequestedTrials, Tree
 
 
 def prepare_devices(devices: int | None = None, kind: str = "") -> None:
@@ -205,6 +206,12 @@ def _beginning() -> Callable[..., EvolutionState]:
     """Return the jitted `first_state`; not at import, because the options depend on the machine."""
     options = compiler_options("least")
     return jax.jit(first_state, static_argnums=0, compiler_options=options)
+
+
+@jax.jit
+def stacked(trees: Sequence[Tree]) -> Tree:
+    """Stack trees to leaves [B, ...] in one program, not one per shape."""
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
 
 
 def embodied(spec: SimulatorSpec, starts: Starts) -> Starts:
