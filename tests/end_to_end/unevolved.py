@@ -8,7 +8,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.champion import Champion
@@ -38,9 +37,10 @@ def unevolved(
 def embodied(experiment: Experiment) -> EvolutionState:
     """Return the first state, rotated until its first genome grows a body that can move."""
     state = experiment.init()
-    known = dataclasses.replace(state, fitness=jnp.zeros_like(state.fitness))
+    genomes = jax.device_get(state.genomes)
+    known = dataclasses.replace(state, fitness=np.zeros(state.fitness.shape, np.float32))
     for place in range(len(state.fitness)):
-        turned = jax.tree.map(partial(jnp.roll, shift=-place, axis=0), state.genomes)
+        turned = jax.tree.map(partial(np.roll, shift=-place, axis=0), genomes)
         with contextlib.suppress(UserError):
             champion = experiment.champion(dataclasses.replace(known, genomes=turned), {})
             champion.embodied(experiment.creature)
@@ -73,19 +73,19 @@ def generation(
     outcomes = _made_up(state.outcome.shape[-1])
     later = dataclasses.replace(
         state,
-        terms=jnp.zeros_like(state.terms),
-        outcome=jnp.broadcast_to(outcomes, state.outcome.shape),
-        fitness=jnp.zeros_like(state.fitness),
+        terms=np.zeros_like(state.terms),
+        outcome=np.broadcast_to(outcomes, state.outcome.shape),
+        fitness=np.zeros_like(state.fitness),
         generation=state.generation + 1,
     )
     names = {field.name for field in dataclasses.fields(GenerationMetrics)}
-    numbers = dict.fromkeys(names - {"mothers", "level"}, jnp.ones(()))
+    numbers = dict.fromkeys(names - {"mothers", "level"}, np.ones(()))
     known = {
         "generation": later.generation,
-        "forced": jnp.zeros((), bool),
-        "best_terms": jnp.zeros(state.terms.shape[-1]),
-        "best_outcome": jnp.zeros(state.outcome.shape[-1]),
-        "mothers": jnp.zeros(state.fitness.shape, jnp.int32) if follows else None,
+        "forced": np.zeros((), bool),
+        "best_terms": np.zeros(state.terms.shape[-1]),
+        "best_outcome": np.zeros(state.outcome.shape[-1]),
+        "mothers": np.zeros(state.fitness.shape, np.int32) if follows else None,
     }
     metrics = GenerationMetrics(**(numbers | known), level=state.level)
     return one_row((later, metrics))
@@ -130,5 +130,5 @@ def line_of(generation: int) -> dict[str, Any]:
 def champion_of(experiment: Experiment) -> Champion:
     """Return the first genome of the first population."""
     state = experiment.init()
-    known = {"fitness": jnp.ones_like(state.fitness), "terms": jnp.zeros_like(state.terms)}
+    known = {"fitness": np.ones_like(state.fitness), "terms": np.zeros_like(state.terms)}
     return experiment.champion(dataclasses.replace(state, **known), {})
