@@ -24,6 +24,7 @@ TOLERANCE = 1e-3
 
 
 @pytest.mark.slow
+@pytest.mark.thorough("it compiles a simulator and an environment of its own")
 def test_an_episode_in_the_environment_is_the_controllers_in_the_simulator(stool: Creature):
     """On an undisturbed trial and one with a push, for two networks."""
     shape = {"hidden": (5,), "every": 2, "period": 0.3}
