@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from animation.keys.made import swings, write
-from helpers import STOOL, made_up_certificate, made_up_evaluate, small_config
+from helpers import STOOL, made_up_certificate, made_up_evaluate, short_examination, small_config
 from PIL import Image
 from rendering.made_up import treading
 
@@ -150,8 +150,9 @@ def said(capsys: pytest.CaptureFixture, *arguments: object, code: int) -> str:
 def test_a_file_becomes_a_run_that_can_be_resumed(
     tmp_path: Path, capsys, stool: Creature, monkeypatch
 ):
-    """Generations simulate nothing; `test_library` simulates a run."""
+    """Generations simulate nothing, examinations last 3 s; `test_library` simulates a run."""
     monkeypatch.setattr(stages, "evaluate", made_up_evaluate)
+    monkeypatch.setattr("mjxgait.certification.certificate.CertificateConfig", short_examination)
     (tmp_path / "small.toml").write_text(SETTINGS)
     file, run = write(tmp_path, "bvh", stool, swings(stool)), tmp_path / "run"
     given = ("--env", STOOL, "--keys", file, "--config", tmp_path / "small.toml", "--keep", 0.8)
