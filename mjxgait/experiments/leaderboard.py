@@ -87,7 +87,7 @@ def entry_of(run: Path, algorithm: str | None, machine: str) -> Entry:
         certified=verdict.certified,
         margin=verdict.margin if math.isfinite(verdict.margin) else None,
         evaluations=int(sum(line["evaluations"] for line in lines)),
-        seconds=float(lines[-1]["wall_s"]) if lines else 0.0,
+        seconds=float(sum(line["wall_s"] for line in lines)),
         version=str(champion.origin.get("versions", {}).get("mjxgait", "unknown")),
     )
 

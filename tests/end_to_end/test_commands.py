@@ -16,7 +16,8 @@ from mjxgait.api import certify
 from mjxgait.certification import read_certificate
 from mjxgait.cli import COMMANDS
 from mjxgait.creature import load_creature
-from mjxgait.training.folder import CERTIFICATE, open_run
+from mjxgait.experiments.leaderboard import entry_of
+from mjxgait.training.folder import CERTIFICATE, METRICS, open_run, read_metrics
 
 ELSEWHERE = {
     "completion": "tests/end_to_end/test_commands.py::test_completion_knows_commands_and_options",
@@ -110,6 +111,15 @@ def test_every_subcommand_is_tested():
     for place in ELSEWHERE.values():
         file, _, test = place.partition("::")
         assert f"def {test}" in (ROOT / file).read_text(encoding="utf-8")
+
+
+def test_a_leaderboard_entry_counts_all_generations(tmp_path: Path):
+    ranked(tmp_path)
+    lines = read_metrics(tmp_path / "run" / METRICS)
+    entry = entry_of(tmp_path / "run", None, "2 cores")
+    assert len(lines) == 2
+    assert entry.seconds == pytest.approx(lines[0]["wall_s"] + lines[1]["wall_s"])
+    assert entry.evaluations == lines[0]["evaluations"] + lines[1]["evaluations"]
 
 
 @pytest.mark.parametrize("shell", SHELLS)
