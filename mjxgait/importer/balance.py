@@ -39,6 +39,11 @@ class Held:
         return self.up > 0.85 and self.height > 0.75 and not self.touched and self.speed < 1.0
 
     @property
+    def sinks(self) -> bool:
+        """True if the creature stayed level, and came down."""
+        return not self.stands and self.up > 0.85 and (self.height < 0.9 or bool(self.touched))
+
+    @property
     def score(self) -> float:
         """Score that ranks stand tests, standing or not: higher is better."""
         return (

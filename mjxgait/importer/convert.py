@@ -118,7 +118,9 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
         notes.change(what, why)
     tell_dropped(model, notes)
     up = source.up.value if source.up else choices.up
-    anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, up, notes)
+    anatomy = find_anatomy(
+        model, source.coupled, choices.keep, choices.freeze, up, notes, source.limbs
+    )
     if source.up:
         notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
     tell_left_out(model, anatomy.bodies, notes)
@@ -166,8 +168,7 @@ def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
                 f"--height is for skeletons ({', '.join(RIGS)}); {path} has its lengths"
             )
         return read_source(path, choices.search, notes)
-    tree, up, bones = model_of(path, choices.up, choices.height, notes)
-    return Source(tree, up=up, bones=bones)
+    return model_of(path, choices.up, choices.height, notes)
 
 
 def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:

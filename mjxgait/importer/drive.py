@@ -89,12 +89,22 @@ class Drive:
 
 
 def plan_drive(
-    kinematics: KinematicModel, q: np.ndarray, stance: Stance, planar: bool, notes: Notes
+    kinematics: KinematicModel,
+    q: np.ndarray,
+    stance: Stance,
+    planar: bool,
+    notes: Notes,
+    stronger: float = 1.0,
 ) -> Drive:
-    """Plan the drive of a body that faces +x in its standing pose [J]."""
+    """Plan the drive of a body that faces +x in its standing pose [J].
+
+    stronger: factor of the gains, and of the torque limits that the file does not state, for a body
+    that sinks: legs far apart bear the weight on longer arms than the hip height.
+    """
     feet = len(kinematics.feet)
     roles, moves = _roles(kinematics, q, stance)
-    weight, inertia = kinematics.mass * GRAVITY * stance.hip, _own_inertia(kinematics)
+    weight = stronger * kinematics.mass * GRAVITY * stance.hip
+    inertia = _own_inertia(kinematics)
     quick = QUICKNESS**2 * GRAVITY / stance.hip * inertia
     kp = np.maximum(
         weight * float(np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS)), quick
@@ -111,6 +121,7 @@ def plan_drive(
     _bend_one_way(kinematics, q, drive, notes)
     _add_armature(kinematics, drive, inertia, notes)
     reason = f"weight {kinematics.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
+    reason += f", and {stronger:g} times as much, because it sank" if stronger > 1 else ""
     reason += "; more where a joint's own inertia needs it" if (kp == quick).any() else ""
     notes.guess("kp, kd", f"{np.median(kp):.3g}, {np.median(kd):.3g}", "medium", reason)
     used = np.isfinite(stated) & (torque == stated)

@@ -40,12 +40,13 @@ def find_anatomy(
     freeze: Sequence[str],
     up: str | None,
     notes: Notes,
+    limbs: frozenset[str] | None = None,
 ) -> Anatomy:
     """Find the anatomy of a compiled model.
 
     Args:
       coupled: names of joints that follow others. keep, freeze: patterns of joints that the user
-        wants active or frozen.
+        wants active or frozen. limbs: see `Source`.
 
     Raises:
       UserError: the model is no creature that can walk; says why.
@@ -62,12 +63,12 @@ def find_anatomy(
     tell_root_joints(model, root, notes)
     movable = movable_joints(model, anatomy, coupled, freeze, notes)
     try:
-        anatomy.feet = find_feet(model, anatomy, movable)
+        anatomy.feet = find_feet(model, anatomy, movable, limbs)
     except NoLegs as error:
         lowered = lowered_limbs(model, anatomy, movable)
         anatomy = measured(model, lowered, axis, scale, spec, shapes)
         anatomy.lowered = True
-        anatomy.feet = find_feet(model, anatomy, movable)
+        anatomy.feet = find_feet(model, anatomy, movable, limbs)
         if len(anatomy.feet) < 2:  # an arm on its base can reach down too
             raise UserError(str(error)) from None
     _choose_joints(model, anatomy, movable, keep, notes)

@@ -72,8 +72,13 @@ def _followers(model: mujoco.MjModel) -> set[int]:
     }
 
 
-def find_feet(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> list[int]:
-    """Return the last moving bodies of the limbs that reach the floor."""
+def find_feet(
+    model: mujoco.MjModel,
+    anatomy: Anatomy,
+    movable: list[int],
+    limbs: frozenset[str] | None = None,
+) -> list[int]:
+    """Return the last moving bodies of the limbs that reach the floor. limbs: see `Source`."""
     movers = {int(model.jnt_bodyid[j]) for j in movable}
     if not movers:
         raise UserError(
@@ -90,6 +95,7 @@ def find_feet(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> li
     height = max(top - floor, 0.1 * span, 1e-6)
     ends = _without_toes(model, anatomy, ends, movers)
     ends = [b for b in ends if not _named_otherwise(model, b, movers)] or ends
+    ends = [b for b in ends if limbs is None or model.body(b).name in limbs] or ends
     feet = sorted(
         b for b in ends if anatomy.low(model, subtree(model, b)) <= floor + SAME_LEVEL * height
     )

@@ -13,8 +13,10 @@ import numpy as np
 from mjxgait.animation.clips.clip import Rig
 from mjxgait.importer.notes import Confidence
 
-MIDDLE = 0.02
-"""Share of the skeleton's span within which a bone begins in the middle."""
+MIDDLE, PAIRED = 0.02, 0.002
+"""Share of the skeleton's span within which a bone begins in the middle; share from which a bone
+and its mirror image on the same parent, such as a bird's thighs, begin beside it.
+"""
 SHORT = 0.04
 """Share of the height below which a bone does not bend on its own."""
 TOE = 0.5
@@ -49,8 +51,26 @@ class Plan:
 
     def in_middle(self, bone: int) -> bool:
         """Return whether a bone begins between left and right."""
-        apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
-        return abs(float(apart)) < MIDDLE * self.span
+        return not self._paired[bone] and abs(self._apart(bone)) < MIDDLE * self.span
+
+    def _apart(self, bone: int) -> float:
+        """Distance in m to the side of the root."""
+        return float(self.rig.places[bone, self.side] - self.rig.places[0, self.side])
+
+    @cached_property
+    def _paired(self) -> list[bool]:
+        """Whether each bone's mirror image begins on the same parent."""
+        near, places = PAIRED * self.span, self.rig.places
+
+        def paired(bone: int) -> bool:
+            image = places[bone].copy()
+            image[self.side] -= 2 * self._apart(bone)
+            brothers = self.rig.children(self.rig.parents[bone])
+            return abs(self._apart(bone)) > near and any(
+                np.linalg.norm(places[other] - image) < near for other in brothers
+            )
+
+        return [bone > 0 and paired(bone) for bone in range(len(places))]
 
     def carries(self, bone: int) -> bool:
         """Return whether a bone is the root, or in the middle with limbs of both sides below."""
@@ -61,8 +81,7 @@ class Plan:
         """Sides of the limbs that begin at each bone or below it."""
         found: list[set[float]] = [set() for _ in self.rig.names]
         for bone in self.limbs:
-            apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
-            found[bone].add(float(np.sign(apart)))
+            found[bone].add(float(np.sign(self._apart(bone))))
         for bone in reversed(range(1, len(found))):
             found[self.rig.parents[bone]] |= found[bone]
         return found
@@ -70,9 +89,7 @@ class Plan:
     @cached_property
     def half_width(self) -> float:
         """Mean distance in m from the middle at which limbs begin."""
-        rig = self.rig
-        apart = np.abs(rig.places[self.limbs, self.side] - rig.places[0, self.side])
-        return float(apart.mean()) if self.limbs else 0.0
+        return float(np.mean([abs(self._apart(b)) for b in self.limbs])) if self.limbs else 0.0
 
     def leaves_middle(self, bone: int) -> bool:
         """Return whether a limb or an ear leaves the trunk at this bone."""
@@ -80,8 +97,27 @@ class Plan:
         return not self.in_middle(bone) and (parent < 0 or self.in_middle(parent))
 
     def is_limb(self, bone: int) -> bool:
-        """Return whether a limb begins at this bone; shorter branches are ears, eyes or handles."""
-        return self.leaves_middle(bone) and self.reach(bone) > LIMB * self.longest
+        """Return whether a limb begins at this bone: a long branch, or one down to the floor.
+
+        Other branches are ears, eyes or handles.
+        """
+        if not self.leaves_middle(bone):
+            return False
+        return self.reach(bone) > LIMB * self.longest or self._comes_down(bone)
+
+    def _comes_down(self, bone: int) -> bool:
+        """Return whether a branch descends to the floor, as the short legs of a winged bird do."""
+        least = LOW * self.height
+        top, tip = self.rig.places[bone, self.up], self.tips[bone, self.up]
+        return bool(tip - self.floor < least < top - tip)
+
+    @cached_property
+    def on_limbs(self) -> list[bool]:
+        """Whether each bone belongs to a limb, or to what hangs on one; tails and bellies do not."""
+        found: list[bool] = []
+        for bone, parent in enumerate(self.rig.parents):
+            found.append(bone in self.limbs or (parent >= 0 and found[parent]))
+        return found
 
     @cached_property
     def limbs(self) -> list[int]:

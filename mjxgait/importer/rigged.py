@@ -15,6 +15,7 @@ from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.errors import UserError
 from mjxgait.importer.notes import Confidence, Guess, Notes, listed, plain_names
 from mjxgait.importer.rig import Hinge, Plan, hinges_of
+from mjxgait.importer.source import Source
 
 RIGS: Mapping[str, Callable[[Path], Rig]] = {".bvh": rig_of_bvh, ".glb": rig_of_glb}
 UP, OTHER, SURER = "y", "z", 1.5
@@ -34,13 +35,11 @@ SKINNED = 8
 """Least number of vertices that determine the thickness of a bone's part."""
 
 
-def model_of(
-    path: Path, up: str | None, height: float | None, notes: Notes
-) -> tuple[ET.Element, Guess, dict[str, str]]:
-    """Return an MJCF tree of a BVH or GLB file's skeleton, its up axis, and its bones by part.
+def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> Source:
+    """Return the model of a BVH or GLB file's skeleton.
 
     Args:
-      up: that axis, if the user states it. height: m, at rest.
+      up: the axis that points up, if the user states it. height: m, at rest.
 
     Raises:
       UserError: the file is damaged, or has no skeleton.
@@ -62,7 +61,9 @@ def model_of(
     )
     _tell(plan, hinges, names, notes)
     bones = dict(zip(names, map(written, plan.rig.names), strict=True))
-    return _tree(plan, hinges, radii, names, notes), upward, bones
+    limbs = {name for name, inside in zip(names, plan.on_limbs, strict=True) if inside}
+    tree = _tree(plan, hinges, radii, names, notes)
+    return Source(tree, up=upward, bones=bones, limbs=frozenset(limbs))
 
 
 def _bare(rig: Rig) -> Rig:
@@ -154,13 +155,25 @@ def _radius(plan: Plan, bone: int) -> float:
     length = max((float(np.linalg.norm(b - a)) for a, b in segments), default=0.0)
     if len(rig.skins[bone]) >= SKINNED and segments:
         away = np.min([_distances(rig.skins[bone], a, b) for a, b in segments], axis=0)
-        return float(np.clip(np.median(away), THIN * plan.height, 0.3 * plan.height))
+        radius = min(float(np.median(away)), _round_radius(rig.skins[bone], *segments[0]))
+        return float(np.clip(radius, THIN * plan.height, 0.3 * plan.height))
     least = THIN * plan.height
     sideways = int(np.abs(plan.way(bone)).argmax()) == plan.side  # such as a collar bone
     if plan.carries(bone) and not sideways:
         return max(TRUNK * plan.half_width, least)
     share, most = (SLIM, 0.5) if plan.in_middle(bone) else (THICK, 1.0)
     return max(min(share * length, most * TRUNK * plan.half_width or np.inf), least)
+
+
+def _round_radius(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+    """Radius in m of a round bar of the cross-section of points [V, 3] about a segment.
+
+    That of a wing or a fin, which is broad and flat, is far smaller than its points' distance.
+    """
+    along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
+    across = np.linalg.svd(along[None])[2][1:]
+    moments = np.linalg.eigvalsh(np.cov(across @ (points - a).T, bias=True))
+    return float(np.sqrt(2.0) * np.maximum(moments, 0.0).prod() ** 0.25)
 
 
 def _distances(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

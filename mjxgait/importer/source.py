@@ -40,6 +40,7 @@ class Source:
     poses: standing poses that the file offers outside keyframes.
     missing: keys of unavailable meshes, each with its expected file; MJCF only.
     up: axis that points up, of a skeleton. bones: its bones by the body that is made of each.
+    limbs: the bodies of its limbs, which alone may be legs; None for other models.
     """
 
     tree: ET.Element
@@ -51,6 +52,7 @@ class Source:
     missing: dict[str, str] = dataclasses.field(default_factory=dict)
     up: Guess | None = None
     bones: dict[str, str] = dataclasses.field(default_factory=dict)
+    limbs: frozenset[str] | None = None
 
 
 class Places:

@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import itertools
 
 import mujoco
 import numpy as np
@@ -26,6 +27,8 @@ SINK = 0.0005
 """m, initial depth of the feet in the floor, about as deep as they rest."""
 STRAIGHT = 0.97
 """Straightness from which legs count as straight."""
+STRONGER = (2.0, 4.0)
+"""Factors of strength for a body that sinks, tried in this order."""
 AT_ITS_END = 0.05
 """rad from an end of its range within which a joint rests on it."""
 
@@ -88,28 +91,16 @@ def standing(
     planar: bool,
     notes: Notes,
 ) -> Candidate:
-    """Return the first pose that stands, of the file's and the search's; else the best one."""
-    tried: list[tuple[str, Candidate]] = []
-    search = Search(kinematics, offered[0][1], mirror, planar)
-    for what, q in offered:
-        tried.append((what, _try(kinematics, q, mirror, planar, notes)))
-        # Legs that are straight out have no length left to step with: such a pose is only the
-        # second choice.
-        if tried[-1][1].held.stands and search.stretch(q) < STRAIGHT:
+    """Return the first pose that stands, of the file's and the search's; else the best one.
+
+    If the best one sinks, all are tried again with more strength.
+    """
+    what, best = _best_pose(kinematics, offered, mirror, planar, notes, 1.0)
+    for stronger in STRONGER:
+        if not best.held.sinks:
             break
-    else:
-        for seed, spread in enumerate(SPREADS):
-            tried.append(
-                (
-                    "a search over leg bends",
-                    _try(kinematics, search.run(spread, seed)[0], mirror, planar, notes),
-                )
-            )
-            if tried[-1][1].held.stands and search.stretch(tried[-1][1].q) < STRAIGHT:
-                break
-    what, best = max(
-        tried, key=lambda pair: pair[1].held.score - 0.2 * (search.stretch(pair[1].q) > STRAIGHT)
-    )
+        other = _best_pose(kinematics, offered, mirror, planar, notes, stronger)
+        what, best = max((what, best), other, key=lambda pair: pair[1].held.score)
     held = best.held
     notes.changes, notes.guesses = best.notes.changes, best.notes.guesses
     if held.stands:
@@ -130,20 +121,48 @@ def standing(
     return best
 
 
+def _best_pose(
+    kinematics: KinematicModel,
+    offered: list[tuple[str, np.ndarray]],
+    mirror: tuple[np.ndarray, np.ndarray] | None,
+    planar: bool,
+    notes: Notes,
+    stronger: float,
+) -> tuple[str, Candidate]:
+    """Return a pose with its description; see `standing` and `plan_drive`."""
+    tried: list[tuple[str, Candidate]] = []
+    search = Search(kinematics, offered[0][1], mirror, planar)
+
+    def tries(what: str, q: np.ndarray) -> bool:
+        """Whether a pose stands on legs that have length left to step with."""
+        tried.append((what, _try(kinematics, q, mirror, planar, notes, stronger)))
+        return tried[-1][1].held.stands and search.stretch(q) < STRAIGHT
+
+    searched = (
+        ("a search over leg bends", search.run(spread, seed)[0])
+        for seed, spread in enumerate(SPREADS)
+    )
+    any(tries(what, q) for what, q in itertools.chain(offered, searched))
+    return max(
+        tried, key=lambda pair: pair[1].held.score - 0.2 * (search.stretch(pair[1].q) > STRAIGHT)
+    )
+
+
 def _try(
     kinematics: KinematicModel,
     q: np.ndarray,
     mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
     notes: Notes,
+    stronger: float,
 ) -> Candidate:
-    """Add foot geoms in a pose, and run the stand test."""
+    """Add foot geoms in a pose, and run the stand test. stronger: see `plan_drive`."""
     notes, trial = copy.deepcopy(notes), kinematics.copy()
     level(trial, q)
     drop(trial, q)
     _keep_stops(trial, q)
     stance = stance_of(trial, q)
-    drive = plan_drive(trial, q, stance, planar, notes)
+    drive = plan_drive(trial, q, stance, planar, notes, stronger)
     feet = lay_soles(trial, stance, planar, notes)
     guard_parts(trial, stance, notes)
     tidy(trial.spec)

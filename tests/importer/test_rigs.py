@@ -125,7 +125,7 @@ def test_every_guess_is_told(dog: Imported):
 
 def test_of_a_skin_its_bones_are_as_thick_as_it(tmp_path: Path):
     """And what moves no skin, such as handles of a rig, is no part of the body."""
-    tree, *_ = model_of(made(tmp_path, "glb"), None, None, Notes())
+    tree = model_of(made(tmp_path, "glb"), None, None, Notes()).tree
     bodies = {body.get("name"): body for body in tree.iter("body")}
     assert set(bodies) == set(DOG)
     for leg in ("LeftThigh", "RightShin", "LeftForearm"):
@@ -168,9 +168,9 @@ def test_up_is_where_limbs_come_down_to_the_floor(tmp_path: Path, bones: Mapping
     file = tmp_path / "rig.bvh"
     for kind, up in ((bones, "y"), (upright(bones), "z")):
         file.write_text(bvh(kind))
-        assert model_of(file, None, None, Notes())[1].value == up
+        assert model_of(file, None, None, Notes()).up.value == up
     file.write_text(bvh(bones))
-    assert model_of(file, "z", None, Notes())[1].value == "z"  # as told
+    assert model_of(file, "z", None, Notes()).up.value == "z"  # as told
 
 
 def test_ears_are_no_limbs(tmp_path: Path):
@@ -274,7 +274,8 @@ def test_limbs_that_lie_sideways_swing_about_the_upright_axis(tmp_path: Path):
 def test_names_lose_what_a_tool_put_before_them(tmp_path: Path):
     file = tmp_path / "dog.bvh"
     file.write_text(bvh(prefix="mixamorig:"))
-    tree, _, bones = model_of(file, None, None, Notes())
+    source = model_of(file, None, None, Notes())
+    tree, bones = source.tree, source.bones
     assert bones == {name: f"mixamorig:{name}" for name in DOG}
     assert {b.get("name") for b in tree.iter("body")} == set(DOG)
 

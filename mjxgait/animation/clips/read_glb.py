@@ -1,11 +1,8 @@
 """Read a GLB file: its tree of nodes, its animation, and its skinned skeleton at rest.
 
-Such files come from strangers, so every failure of the library becomes a one-sentence error.
+Such files come from strangers, so each defect is a one-sentence error.
 """
 
-import json
-import struct
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -20,14 +17,10 @@ from mjxgait.animation.clips.clip import (
     check_numbers,
     check_size,
     check_times,
-    read_bytes,
 )
+from mjxgait.animation.clips.glb_document import DAMAGED, Document, Part, open_glb
 from mjxgait.errors import UserError
 
-MAGIC, HEAD = b"glTF", 20
-"""First bytes of a file; number of bytes before its description, which comes first."""
-MOST_PARTS = 30_000
-"""Largest number of accessors, channels and the like; the library reads them one by one."""
 TYPES = {
     gltf.BYTE: np.int8,
     gltf.UNSIGNED_BYTE: np.uint8,
@@ -36,72 +29,29 @@ TYPES = {
     gltf.FLOAT: np.float32,
 }
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-DAMAGED = (
-    ArithmeticError,
-    AttributeError,
-    LookupError,
-    RecursionError,
-    TypeError,
-    ValueError,
-    struct.error,
-)
-"""Errors raised while reading content that does not follow its format."""
 
 
-def open_glb(path: Path) -> gltf.GLTF2:
-    """Return a file's description with its binary part.
-
-    Raises:
-      UserError: it is no GLB, is cut off, damaged, or has more bones than one creature.
-    """
-    data = read_bytes(path)
-    if len(data) < HEAD or data[:4] != MAGIC:
-        raise UserError(f"{path}: not a GLB file; export as glTF binary (.glb)")
-    if struct.unpack_from("<I", data, 8)[0] > len(data):
-        raise UserError(f"{path}: is cut off: it states more bytes than it has")
-    try:
-        _check_parts(path, data[HEAD : HEAD + struct.unpack_from("<I", data, 12)[0]])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about versions and parts that it does not know
-            document = gltf.GLTF2.load_from_bytes(data)
-        if any(buffer.uri for buffer in document.buffers):
-            raise UserError(f"{path}: refers to another file; export as one GLB")
-    except DAMAGED:
-        raise UserError(f"{path}: its description is damaged") from None
-    return document
-
-
-def _check_parts(path: Path, description: bytes) -> None:
-    """Refuse files that would take the library minutes."""
-    lists = json.loads(description)
-    if not isinstance(lists.get("nodes", []), list):
-        raise UserError(f"{path}: its list of nodes is damaged")
-    check_size(path, len(lists.get("nodes", [])), 2)
-    if description.count(b"{") > MOST_PARTS:
-        raise UserError(f"{path}: of more than {MOST_PARTS} parts; export one creature, one clip")
-
-
-def tree(path: Path, nodes: Sequence[gltf.Node]) -> tuple[list[int], list[int]]:
+def tree(path: Path, nodes: Sequence[Part]) -> tuple[list[int], list[int]]:
     """Parent of each node, -1 for none, and an order with parents first."""
     parents = [-1] * len(nodes)
     for i, node in enumerate(nodes):
         for child in node.children or []:
             parents[child] = i
     order = [i for i, parent in enumerate(parents) if parent < 0]
-    for node in order:
-        order += [child for child in nodes[node].children or [] if parents[child] == node]
+    for place in order:
+        order += [child for child in nodes[place].children or [] if parents[child] == place]
     if len(order) != len(nodes):
         raise UserError(f"{path}: its nodes are no tree")
     return parents, order
 
 
-def name_of(nodes: Sequence[gltf.Node], node: int) -> str:
+def name_of(nodes: Sequence[Part], node: int) -> str:
     """A node's name, or one made of its number."""
     name = nodes[node].name
     return f"node {node}" if name is None else str(name)
 
 
-def placed(node: gltf.Node) -> np.ndarray:
+def placed(node: Part) -> np.ndarray:
     """Transform [4, 4] of a node at rest against its parent."""
     if node.matrix:
         return np.array(node.matrix, float).reshape(4, 4).T
@@ -112,12 +62,12 @@ def placed(node: gltf.Node) -> np.ndarray:
     return whole
 
 
-def values(document: gltf.GLTF2, number: int, every: int = 1) -> np.ndarray:
+def values(document: Document, number: int, every: int = 1) -> np.ndarray:
     """Stored values [n, width] of an accessor. every: take one in this many."""
     accessor = document.accessors[number]
     if accessor.bufferView is None or accessor.sparse:
         raise ValueError("an accessor without plain values")
-    view, blob = document.bufferViews[accessor.bufferView], document.binary_blob() or b""
+    view, blob = document.bufferViews[accessor.bufferView], document.blob
     kind, width = np.dtype(TYPES[accessor.componentType]), WIDTHS[accessor.type]
     start = (view.byteOffset or 0) + (accessor.byteOffset or 0)
     stride, count = view.byteStride or width * kind.itemsize, accessor.count
@@ -170,19 +120,19 @@ def read_glb(path: Path) -> Clip:
     return Clip(names, tuple(parents), times - times[0], turned, note)
 
 
-def _turn(node: gltf.Node) -> np.ndarray:
+def _turn(node: Part) -> np.ndarray:
     """Rotation [3, 3] of a node at rest."""
     columns = placed(node)[:3, :3]
     return Rotation.from_matrix(columns / np.linalg.norm(columns, axis=0)).as_matrix()
 
 
-def _note(nodes: Sequence[gltf.Node]) -> str:
+def _note(nodes: Sequence[Part]) -> str:
     """The note of an exported walk, found on one of its nodes; else empty."""
-    notes = (node.extras.get(NOTE) for node in nodes if isinstance(node.extras, dict))
+    notes = (getattr(node.extras, NOTE, None) for node in nodes if node.extras is not None)
     return next((note for note in notes if isinstance(note, str)), "")
 
 
-def _keys(path: Path, document: gltf.GLTF2) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+def _keys(path: Path, document: Document) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """Times [n] s and quaternions [n, 4] (x, y, z, w) of each node that turns."""
     found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     for animation in document.animations[:1]:
@@ -242,7 +192,7 @@ def rig_of_glb(path: Path) -> Rig:
         raise UserError(f"{path}: its content is damaged ({error!r})") from None
 
 
-def skin_of(path: Path, document: gltf.GLTF2) -> int:
+def skin_of(path: Path, document: Document) -> int:
     """Return the number of the skin with the most bones.
 
     Raises:
@@ -256,7 +206,7 @@ def skin_of(path: Path, document: gltf.GLTF2) -> int:
     return max(range(len(document.skins)), key=lambda s: len(document.skins[s].joints))
 
 
-def worlds(path: Path, nodes: Sequence[gltf.Node]) -> tuple[list[int], list[int], np.ndarray]:
+def worlds(path: Path, nodes: Sequence[Part]) -> tuple[list[int], list[int], np.ndarray]:
     """Parents and order of the nodes, see `tree`, and their transforms [N, 4, 4] at rest."""
     parents, order = tree(path, nodes)
     world = np.zeros((len(nodes), 4, 4))
@@ -266,7 +216,7 @@ def worlds(path: Path, nodes: Sequence[gltf.Node]) -> tuple[list[int], list[int]
     return parents, order, world
 
 
-def _rig(path: Path, document: gltf.GLTF2, number: int) -> Rig:
+def _rig(path: Path, document: Document, number: int) -> Rig:
     nodes = document.nodes
     parents, order, world = worlds(path, nodes)
     skins = _skins(document, number, world)
@@ -282,7 +232,7 @@ def _rig(path: Path, document: gltf.GLTF2, number: int) -> Rig:
     return whole.taken([i for i, node in enumerate(order) if node in joints])
 
 
-def _skins(document: gltf.GLTF2, number: int, world: np.ndarray) -> Mapping[int, np.ndarray]:
+def _skins(document: Document, number: int, world: np.ndarray) -> Mapping[int, np.ndarray]:
     """Vertices [V, 3] that follow each joint most, placed as in the skeleton at rest."""
     skin = document.skins[number]
     joints = np.array(skin.joints, int)

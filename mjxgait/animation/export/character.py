@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import pygltflib as gltf  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.clips.clip import read_bytes, written
-from mjxgait.animation.clips.read_glb import DAMAGED, name_of, open_glb, placed, skin_of, worlds
+from mjxgait.animation.clips.glb_document import DAMAGED, Part, open_glb
+from mjxgait.animation.clips.read_glb import name_of, placed, skin_of, worlds
 from mjxgait.errors import UserError
 
 
@@ -27,7 +27,7 @@ class Character:
 
     path: Path
     data: bytes
-    nodes: tuple[gltf.Node, ...]
+    nodes: tuple[Part, ...]
     parents: tuple[int, ...]
     order: tuple[int, ...]
     local: np.ndarray
@@ -66,10 +66,10 @@ def read_character(path: Path) -> Character:
         for joint in document.skins[skin_of(path, document)].joints:
             name = written(name_of(nodes, joint))
             bones[name] = (*bones.get(name, ()), joint)
+        clips = frozenset(str(animation.name) for animation in document.animations)
     except DAMAGED as error:
         raise UserError(f"{path}: its content is damaged ({error!r})") from None
     if not np.isfinite(world).all():
         raise UserError(f"{path}: the place of a node is not a finite number; export it again")
-    clips = frozenset(str(animation.name) for animation in document.animations)
     data, tree = read_bytes(path), (tuple(nodes), tuple(parents), tuple(order))
     return Character(path, data, *tree, local, world, bones, clips)

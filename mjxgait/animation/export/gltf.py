@@ -4,13 +4,20 @@ Rungs pass with a walk; tiles are moved by a page. Axes are glTF's: Y up, forwar
 """
 
 import json
-import struct
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
+from mjxgait.animation.clips.glb_document import (
+    BINARY,
+    CHUNK,
+    DESCRIPTION,
+    HEADER,
+    MAGIC,
+    read_chunks,
+)
 from mjxgait.animation.export.loop import WalkLoop
 
 KINDS = {
@@ -93,9 +100,6 @@ def add_channel(
     )
 
 
-HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
-"""Magic, version and length of a file; length and kind of a chunk."""
-JSON, BINARY = b"JSON", b"BIN\0"
 SAMPLES = ("input", "output")
 """Keys of a sampler that are numbers of accessors."""
 
@@ -111,8 +115,8 @@ def added(data: bytes, buffer: Buffer, nodes: Mapping[int, Mapping[str, Any]]) -
     Raises:
       ValueError, LookupError, TypeError, struct.error: the file is damaged.
     """
-    chunks = _chunks(data)
-    whole, blob = json.loads(chunks.pop(JSON)), bytearray(chunks.pop(BINARY, b""))
+    chunks = read_chunks(data)
+    whole, blob = json.loads(chunks.pop(DESCRIPTION)), bytearray(chunks.pop(BINARY, b""))
     buffers = whole.setdefault("buffers", [])
     if sum(each["byteLength"] for each in buffers[:1]) > len(blob):
         raise ValueError("its binary part is too short")
@@ -135,28 +139,17 @@ def added(data: bytes, buffer: Buffer, nodes: Mapping[int, Mapping[str, Any]]) -
         merged = whole["nodes"][number] | change
         whole["nodes"][number] = {key: value for key, value in merged.items() if value is not None}
     text = json.dumps(whole, separators=(",", ":")).encode()
-    return _joined({JSON: text, BINARY: bytes(blob)} | chunks)
-
-
-def _chunks(data: bytes) -> dict[bytes, bytes]:
-    """Content of a file's chunks by kind."""
-    found, at = {}, HEADER.size
-    while at + CHUNK.size <= len(data):
-        length, kind = CHUNK.unpack_from(data, at)
-        at += CHUNK.size
-        found[kind] = data[at : at + length]
-        at += length
-    return found
+    return _joined({DESCRIPTION: text, BINARY: bytes(blob)} | chunks)
 
 
 def _joined(chunks: Mapping[bytes, bytes]) -> bytes:
     """A file of chunks, each filled up to whole words: JSON with blanks."""
     parts = []
     for kind, content in chunks.items():
-        filled = content + (b" " if kind == JSON else b"\0") * (-len(content) % 4)
+        filled = content + (b" " if kind == DESCRIPTION else b"\0") * (-len(content) % 4)
         parts.append(CHUNK.pack(len(filled), kind) + filled)
     body = b"".join(parts)
-    return HEADER.pack(b"glTF", 2, HEADER.size + len(body)) + body
+    return HEADER.pack(MAGIC, 2, HEADER.size + len(body)) + body
 
 
 APART, DEEP, WIDE = 0.35, 0.06, 0.9

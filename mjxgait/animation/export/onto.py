@@ -16,7 +16,8 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation
 
-from mjxgait.animation.clips.read_glb import DAMAGED, name_of
+from mjxgait.animation.clips.glb_document import DAMAGED
+from mjxgait.animation.clips.read_glb import name_of
 from mjxgait.animation.export.character import Character
 from mjxgait.animation.export.footfalls import contacts
 from mjxgait.animation.export.gltf import Buffer, add_channel, added, facts_of

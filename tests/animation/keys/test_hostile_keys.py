@@ -91,7 +91,7 @@ GLB = {
     "longer than it is": (stated_longer, "is cut off"),
     "shorter than it is": (lambda d: d[:8] + struct.pack("<I", 16) + d[12:], "damaged"),
     "parts without end": (
-        lambda d: altered(d, lambda x: x.update(accessors=x["accessors"] * 9000)),
+        lambda d: altered(d, lambda x: x.update(accessors=x["accessors"] * 25_000)),
         "export one creature",
     ),
     "no animation": (lambda d: altered(d, lambda x: x.pop("animations")), "no animation"),
