@@ -31,7 +31,7 @@ def dog(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, WalkLoop]:
 
 def refused(loop: WalkLoop, file: Path) -> str:
     with pytest.raises(UserError) as raised:
-        build_onto(loop, read_character(file))
+        build_onto({"walk-loop": loop}, read_character(file))
     assert "\n" not in str(raised.value)
     return str(raised.value)
 
@@ -137,7 +137,7 @@ def test_whatever_happens_to_a_character_on_its_way_there_is_no_traceback(
         other.write_bytes(bytes(bad))
         with contextlib.suppress(UserError):
             try:
-                build_onto(loop, read_character(other))
+                build_onto({"walk-loop": loop}, read_character(other))
             except UserError as error:
                 sentences.append(str(error))
                 raise

@@ -19,7 +19,7 @@ from mjxgait.animation.export.loop import (
     walk_loop,
     walk_take,
 )
-from mjxgait.animation.export.onto import LOOP, export_onto
+from mjxgait.animation.export.onto import LOOP, bones_of, build_onto, export_onto
 from mjxgait.animation.export.usd import export_usd
 from mjxgait.animation.export.viewpoint import viewpoint
 
@@ -28,10 +28,12 @@ __all__ = [
     "RATES",
     "Character",
     "WalkLoop",
+    "bones_of",
     "build_bvh",
     "build_clips",
     "build_driven",
     "build_glb",
+    "build_onto",
     "contacts",
     "export_bvh",
     "export_glb",

@@ -1,4 +1,4 @@
-"""A walk as an animation of the user's own character.
+"""Walks as animations of the user's own character.
 
 The creature was imported from the skeleton of that character. Nothing of the file changes; key
 frames follow at its end. At rest the parts of the creature are where the bones are, so a bone turns
@@ -8,7 +8,7 @@ the file.
 
 import dataclasses
 import itertools
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 import mujoco
@@ -52,32 +52,44 @@ def export_onto(loop: WalkLoop, character: Character, path: Path, travelling: bo
     Raises:
       UserError: the file has not the creature's skeleton, or cannot be written.
     """
-    name, data = build_onto(loop, character, travelling)
+    names, data = build_onto({f"walk{LOOP}": loop}, character, travelling)
     with writing(path):
         write_bytes(path, data)
-    return name
+    return names[f"walk{LOOP}"]
 
 
-def build_onto(loop: WalkLoop, character: Character, travelling: bool = False) -> tuple[str, bytes]:
-    """The name of the animation, and the bytes of the character's file with it.
+def build_onto(
+    loops: Mapping[str, WalkLoop], character: Character, travelling: bool = False
+) -> tuple[dict[str, str], bytes]:
+    """The bytes of the character's file with loops of one creature as animations.
+
+    All move the same bones, so that programs can blend them. The first value is the name of each
+    animation by the name of its loop; they differ if the file has one of that name.
 
     travelling: the topmost bone moves on evenly; otherwise the character walks in place.
 
     Raises:
       UserError: the file has not the creature's skeleton.
     """
+    loop = next(iter(loops.values()))
+    bones = bones_of(loop.walk.creature, character)
     try:
-        bones = _bones_of(loop.walk.creature, character)
         fit = _fitted(loop, character, bones)
-        goals = _goals(loop, character, bones, fit, travelling)
-        tracks = _tracks(character, goals)
-        return _finished(loop, character, bones, fit, tracks, travelling)
+        tracks = {
+            name: _tracks(character, _goals(each, character, bones, fit, travelling))
+            for name, each in loops.items()
+        }
+        return _finished(loops, character, bones, fit, tracks, travelling)
     except DAMAGED as error:
         raise UserError(f"{character.path}: its content is damaged ({error!r})") from None
 
 
-def _bones_of(creature: Creature, character: Character) -> dict[str, int]:
-    """Node of the file by part of the creature."""
+def bones_of(creature: Creature, character: Character) -> dict[str, int]:
+    """Node of the file by part of the creature.
+
+    Raises:
+      UserError: the file lacks its bones, or the creature has none.
+    """
     rig = creature.settings.rig
     if not creature.is_rig:
         raise UserError(
@@ -215,15 +227,15 @@ def _root_bone(character: Character, trunk: int, goals: Mapping[int, Goal]) -> i
     return next((node for node in reversed(character.above(trunk)) if node in joints), None)
 
 
-Track = tuple[str, np.ndarray]
-"""Path of a channel, and its values: translations [F, 3] or quaternions [F, 4]."""
+Channel = tuple[int, str]
+"""Node, and its path: rotation or translation."""
 
 
-def _tracks(character: Character, goals: Mapping[int, Goal]) -> dict[int, list[Track]]:
-    """The channels that move, by node; all other nodes rest against their parents."""
+def _tracks(character: Character, goals: Mapping[int, Goal]) -> dict[Channel, np.ndarray]:
+    """Values [F, 3 or 4] of the goals' channels; all other nodes rest against their parents."""
     frames = len(next(iter(goals.values())).world)
     world = np.zeros((frames, len(character.nodes), 4, 4))
-    tracks: dict[int, list[Track]] = {}
+    tracks: dict[Channel, np.ndarray] = {}
     for node in character.order:
         parent = character.parents[node]
         above = world[:, parent] if parent >= 0 else np.tile(np.eye(4), (frames, 1, 1))
@@ -234,9 +246,10 @@ def _tracks(character: Character, goals: Mapping[int, Goal]) -> dict[int, list[T
             local[:, :3, :3] = own[:, :3, :3]
             if goals[node].free:
                 local[:, :3, 3] = own[:, :3, 3]
-            tracks[node] = _moving(character, node, local)
+            tracks[node, "rotation"] = _turns(character, node, local)
+            tracks[node, "translation"] = local[:, :3, 3]
         world[:, node] = above @ local
-    return {node: found for node, found in tracks.items() if found}
+    return tracks
 
 
 def _check_scale(character: Character, node: int) -> None:
@@ -256,42 +269,64 @@ def _check_scale(character: Character, node: int) -> None:
             )
 
 
-def _moving(character: Character, node: int, local: np.ndarray) -> list[Track]:
-    """The channels of a node with transforms [F, 4, 4] against its parent, if it moves."""
-    place, quat, _ = character.split(node)
+def _turns(character: Character, node: int, local: np.ndarray) -> np.ndarray:
+    """Quaternions [F, 4] of a node with transforms [F, 4, 4] against its parent."""
+    _, quat, _ = character.split(node)
     back = np.linalg.inv(character.local[node, :3, :3]) @ Rotation.from_quat(quat).as_matrix()
     quats = quaternions(local[:, :3, :3] @ back)
     quats *= np.copysign(1.0, quats[0] @ quat)
-    tracks: list[Track] = [("rotation", quats)] if np.abs(quats - quat).max() > STILL else []
-    if np.abs(local[:, :3, 3] - place).max() > STILL:
-        tracks.append(("translation", local[:, :3, 3]))
-    return tracks
+    return quats
+
+
+def _moving(character: Character, tracks: Iterable[Mapping[Channel, np.ndarray]]) -> list[Channel]:
+    """The channels that leave their rest in any loop."""
+    found: dict[Channel, bool] = {}
+    for track in tracks:
+        for (node, path), values in track.items():
+            place, quat, _ = character.split(node)
+            still = quat if path == "rotation" else place
+            moves = bool(np.abs(values - still).max() > STILL)
+            found[node, path] = found.get((node, path), False) or moves
+    return [channel for channel, moves in found.items() if moves]
 
 
 def _finished(
-    loop: WalkLoop,
+    loops: Mapping[str, WalkLoop],
     character: Character,
     bones: Mapping[str, int],
     fit: Fit,
-    tracks: Mapping[int, list[Track]],
+    tracks: Mapping[str, Mapping[Channel, np.ndarray]],
     travelling: bool,
-) -> tuple[str, bytes]:
-    """The name of the animation, and the bytes of the file."""
+) -> tuple[dict[str, str], bytes]:
+    """The names of the animations, and the bytes of the file."""
     document = gltf.GLTF2()
-    buffer = Buffer(document)
-    names = (f"walk_{i}{LOOP}" if i > 1 else f"walk{LOOP}" for i in itertools.count(1))
-    animation = gltf.Animation(name=next(name for name in names if name not in character.clips))
-    times = buffer.add(loop.times.astype(np.float32), bounds=True)
-    for node, found in tracks.items():
-        for path, values in found:
-            add_channel(buffer, animation, times, node, path, values)
+    buffer, names = Buffer(document), _free_names(loops, character.clips)
+    moving = _moving(character, tracks.values())
     names_of = {part: name_of(character.nodes, node) for part, node in bones.items()}
-    feet = [names_of.get(foot, foot) for foot in loop.walk.creature.feet.names]
-    animation.extras = facts_of(loop, travelling, fit.factor) | {"contacts": contacts(loop, feet)}
-    document.animations.append(animation)
+    for name, loop in loops.items():
+        animation = gltf.Animation(name=names[name])
+        times = buffer.add(loop.times.astype(np.float32), bounds=True)
+        for node, path in moving:
+            add_channel(buffer, animation, times, node, path, tracks[name][node, path])
+        feet = [names_of.get(foot, foot) for foot in loop.walk.creature.feet.names]
+        falls = contacts(loop, feet) if loop.strides else []
+        animation.extras = facts_of(loop, travelling, fit.factor) | {"contacts": falls}
+        document.animations.append(animation)
     # glTF allows no key frames for a node that is placed by a matrix.
-    nodes = {node: _unmatrixed(character, node) for node in tracks if character.nodes[node].matrix}
-    return animation.name, added(character.data, buffer, nodes)
+    placed = {node for node, _ in moving if character.nodes[node].matrix}
+    return names, added(
+        character.data, buffer, {node: _unmatrixed(character, node) for node in placed}
+    )
+
+
+def _free_names(loops: Iterable[str], taken: Collection[str]) -> dict[str, str]:
+    """A name that the file does not have yet for each loop."""
+    names = {}
+    for name in loops:
+        stem, end = name.removesuffix(LOOP), LOOP * name.endswith(LOOP)
+        tries = (f"{stem}_{i}{end}" if i > 1 else name for i in itertools.count(1))
+        names[name] = next(each for each in tries if each not in taken)
+    return names
 
 
 def _unmatrixed(character: Character, node: int) -> dict[str, object]:
