@@ -5,7 +5,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mjxgait.certification.criteria import Criterion, Measure
+from mjxgait.certification.feasibility import feasibility
 from mjxgait.certification.remedies import FALLS, FOLLOWS, TABLE, Entry
+from mjxgait.creature import Creature
 
 ADVICE = "advice"
 """Key of a report: these sentences; absent if all criteria passed."""
@@ -41,11 +43,13 @@ def advice(
 
 
 def advised(
-    criteria: Sequence[Criterion], task: str, report: Mapping[str, Any]
+    criteria: Sequence[Criterion], task: str, report: Mapping[str, Any], creature: Creature
 ) -> dict[str, list[str]]:
     """Return a report's entry with the advice; empty if all criteria passed."""
-    said = advice(criteria, task, report)
-    return {ADVICE: said} if said else {}
+    if all(criterion.passed for criterion in criteria):
+        return {}
+    limits = [] if creature.settings.creature.grows else feasibility(creature).limits
+    return {ADVICE: advice(criteria, task, report, limits)}
 
 
 def entry_of(criterion: Criterion, measure: Measure) -> Entry:

@@ -193,7 +193,7 @@ def certify(
     if pushed:
         sizes = (0.0, config.pushes.speed, *config.pushes.ladder)
         report |= _bears(dict(zip(sizes, (plain, *pushed), strict=True)))
-    report |= advised(tested, champion.task, report)
+    report |= advised(tested, champion.task, report, creature)
     return Certificate(
         creature.name,
         creature.digest,

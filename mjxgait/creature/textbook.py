@@ -38,7 +38,7 @@ class Footfalls:
 
 def textbook_cycle(creature: Creature, falls: Footfalls, poses: int) -> np.ndarray:
     """Angles [C, J] rad, within the pose ranges, at `poses` moments of the cycle."""
-    legs = [_Leg(creature, foot) for foot in range(len(creature.feet.names))]
+    legs = [Leg(creature, foot) for foot in range(len(creature.feet.names))]
     cycle = np.tile(creature.joints.stand, (poses, 1))
     for leg, phase in zip(legs, falls.phases, strict=True):
         # Twice around: in the second round the first moment, too, starts from the one before it.
@@ -57,7 +57,7 @@ def _path(share: float, falls: Footfalls) -> tuple[float, float]:
     return -half * np.cos(np.pi * swing), falls.lift * np.sin(np.pi * swing)
 
 
-class _Leg:
+class Leg:
     """The joints that move one foot and no other, and their kinematics."""
 
     def __init__(self, creature: Creature, foot: int) -> None:
@@ -78,14 +78,14 @@ class _Leg:
         nose = self.data.xmat[creature.trunk].reshape(3, 3) @ creature.frame.forward * [1, 1, 0]
         self.ahead = nose / np.linalg.norm(nose)
 
-    def reach(self, path: tuple[float, float], pose: np.ndarray) -> np.ndarray:
+    def reach(
+        self, path: tuple[float, float], pose: np.ndarray, crouch: float = CROUCH
+    ) -> np.ndarray:
         """Angles of the leg's joints [j] that bring the foot nearest to a place.
 
-        Damped least squares, starting from a pose [J].
+        Damped least squares, starting from a pose [J]. crouch: hip heights.
         """
-        hip, joints = self.creature.frame.hip_height, self.creature.joints
-        ahead, above = path
-        goal = self.place + ahead * self.ahead + [0, 0, above + CROUCH * hip]
+        joints, goal = self.creature.joints, self._goal(path, crouch)
         pose = pose.copy()
         low, high = joints.pose_low[self.joints], joints.pose_high[self.joints]
         for _ in range(ROUNDS):
@@ -94,6 +94,17 @@ class _Leg:
             moved = pose[self.joints] + np.linalg.solve(square, slopes.T @ off)
             pose[self.joints] = np.clip(moved, low, high)
         return pose[self.joints]
+
+    def missed(self, path: tuple[float, float], pose: np.ndarray, crouch: float = CROUCH) -> float:
+        """Distance of the foot in a pose [J] from a place, in hip heights."""
+        off, _ = self._off(self._goal(path, crouch), pose)
+        return float(np.linalg.norm(off[:3]))
+
+    def _goal(self, path: tuple[float, float], crouch: float) -> np.ndarray:
+        """Place [3] in m of the foot, ahead of and above where it stands."""
+        ahead, above = path
+        up = above + crouch * self.creature.frame.hip_height
+        return np.asarray(self.place + ahead * self.ahead + [0, 0, up])
 
     def _off(self, goal: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Error [6] to the goal, in hip heights, and its slopes [6, j]."""

@@ -14,6 +14,7 @@ from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.certification.remedies import AGAIN, TABLE
 from mjxgait.cli.train_options import TrainOptions
 from mjxgait.config.schema import UseConfig
+from mjxgait.creature import Creature
 from mjxgait.creature.settings import Identity, JointSettings
 from mjxgait.kinds import tasks
 from mjxgait.plugins.registry import config_class
@@ -162,13 +163,13 @@ def test_a_limit_of_the_body_takes_the_place_of_the_remedy():
     assert advice([criterion], "walk", {}, [weak])[1:] == [*weak]
 
 
-def test_a_measure_of_the_user_is_named_with_its_numbers():
+def test_a_measure_of_the_user_is_named_with_its_numbers(stool: Creature):
     criterion, _ = made_up("height of the ball")
     said = advice([criterion], "mine.py:Juggle", {})
     assert said == ["Its height of the ball is 0.4; 0.9 is needed.", AGAIN]
-    assert advised([criterion], "mine.py:Juggle", {}) == {ADVICE: said}
+    assert advised([criterion], "mine.py:Juggle", {}, stool) == {ADVICE: said}
 
 
-def test_what_passes_needs_no_advice():
+def test_what_passes_needs_no_advice(stool: Creature):
     criterion, _ = made_up("speed (body lengths/s)", value=1.0)
-    assert advised([criterion], "walk", {}) == {}
+    assert advised([criterion], "walk", {}, stool) == {}
