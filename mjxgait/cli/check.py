@@ -6,11 +6,11 @@ from pathlib import Path
 
 import tyro
 
+from mjxgait.api import load_creature
 from mjxgait.certification.check_body import check_body
 from mjxgait.certification.feasibility import feasibility
 from mjxgait.cli.options import parsed
-from mjxgait.config.layers import find_creature
-from mjxgait.creature import load_creature
+from mjxgait.creature import load_creature as load_folder
 from mjxgait.errors import UserError
 from mjxgait.files import replaced, writing
 from mjxgait.tasks.walk.targets import WalkTargets, configured
@@ -25,7 +25,7 @@ class CheckOptions:
     its feet, axes and mirror pairs.
 
     Attributes:
-      env: Creature folder, or the name of a shipped creature.
+      env: Creature folder, name of a shipped creature, model file, or robot:NAME.
       out: The picture; by default <name>-check.png in the current folder.
     """
 
@@ -37,7 +37,7 @@ def check_command(arguments: Sequence[str]) -> int:
     """Return the exit code: 1 for a creature that is valid but does not stand."""
     options = parsed(CheckOptions, "check", arguments)
     folder = Path(options.env)
-    creature = load_creature(folder if folder.is_dir() else find_creature(options.env))
+    creature = load_folder(folder) if folder.is_dir() else load_creature(options.env)
     configured(creature, None, {}, WalkTargets())
     grows = creature.settings.creature.grows
     if not grows:
