@@ -6,7 +6,7 @@ from typing import Any
 
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.certification.feasibility import feasibility
-from mjxgait.certification.remedies import FALLS, FOLLOWS, TABLE, Entry
+from mjxgait.certification.remedies import TABLE, USUAL, Entry
 from mjxgait.creature import Creature
 
 ADVICE = "advice"
@@ -36,8 +36,8 @@ def advice(
     cause = _cause(first, worst, report)
     if limits:
         return [cause, *limits[0]]
-    # After a fall nothing else tells much, and what repeats other measures never does.
-    apart = [pair for pair in others if {first.order, pair[0].order}.isdisjoint((FALLS, FOLLOWS))]
+    # After a fall or without headway nothing else tells much; what repeats others never does.
+    apart = [pair for pair in others if first.order == USUAL == pair[0].order]
     more = [said for said in (_cause(*pair, report) for pair in apart) if said != cause]
     return [cause, *more[:1], first.remedy_for(task)]
 

@@ -70,7 +70,8 @@ class Statics:
             return Load()
         found = [self._at_height(leg, own, ways, lower) for lower in LOWER]
         known = [load for load in found if load is not None]
-        return min(known, key=lambda load: load.share, default=Load())
+        known = known or [self._carries(leg, own, self.creature.joints.stand)]
+        return min(known, key=lambda load: load.share)
 
     def _at_height(
         self, leg: Leg, own: np.ndarray, ways: Sequence[float], lower: float
@@ -85,11 +86,15 @@ class Statics:
             angles[leg.joints] = leg.reach((way, 0.0), joints.stand, lower)
             if leg.missed((way, 0.0), angles, lower) > REACHED:
                 return None
-            pose = self.stand.copy()
-            pose[joints.qpos_adr] = angles
-            self._pose(pose)
-            loads.append(self._load(leg.joints, self._least_torques(leg, own)))
+            loads.append(self._carries(leg, own, angles))
         return max(loads, key=lambda load: load.share)
+
+    def _carries(self, leg: Leg, own: np.ndarray, angles: np.ndarray) -> Load:
+        """Load with all joints at these angles [J]."""
+        pose = self.stand.copy()
+        pose[self.creature.joints.qpos_adr] = angles
+        self._pose(pose)
+        return self._load(leg.joints, self._least_torques(leg, own))
 
     def standing(self, joints: np.ndarray) -> Load:
         """Return the load in standing of joints [j] that belong to no single leg."""

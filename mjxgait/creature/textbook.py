@@ -58,9 +58,12 @@ def _path(share: float, falls: Footfalls) -> tuple[float, float]:
 
 
 class Leg:
-    """The joints that move one foot and no other, and their kinematics."""
+    """The joints that move one foot and no other, and their kinematics.
 
-    def __init__(self, creature: Creature, foot: int) -> None:
+    sideways: weight of a foot's distance to the side of its place, against that ahead or above.
+    """
+
+    def __init__(self, creature: Creature, foot: int, sideways: float = 1.0) -> None:
         model, feet = creature.model, creature.feet
         self.creature, self.model = creature, model
         self.data = mujoco.MjData(model)
@@ -77,6 +80,8 @@ class Leg:
         self.place, self.level = place, self.data.xmat[self.body].reshape(3, 3).copy()
         nose = self.data.xmat[creature.trunk].reshape(3, 3) @ creature.frame.forward * [1, 1, 0]
         self.ahead = nose / np.linalg.norm(nose)
+        left = np.cross([0.0, 0.0, 1.0], self.ahead)
+        self.counts = np.eye(3) - (1.0 - sideways) * np.outer(left, left)
 
     def reach(
         self, path: tuple[float, float], pose: np.ndarray, crouch: float = CROUCH
@@ -115,8 +120,8 @@ class Leg:
         mujoco.mj_jac(self.model, self.data, moves, turns, point, self.body)
         dofs = self.creature.joints.dof_adr[self.joints]
         tilt = 0.5 * sum(np.cross(turned[:, axis], self.level[:, axis]) for axis in range(3))
-        off = np.concatenate([(goal - point) / hip, TURN * tilt])
-        return off, np.concatenate([moves[:, dofs] / hip, TURN * turns[:, dofs]])
+        off = np.concatenate([self.counts @ (goal - point) / hip, TURN * tilt])
+        return off, np.concatenate([self.counts @ moves[:, dofs] / hip, TURN * turns[:, dofs]])
 
     def _pose(self, pose: np.ndarray) -> None:
         self.data.qpos[:] = self.creature.stand_qpos
