@@ -37,7 +37,7 @@ def check_command(arguments: Sequence[str]) -> int:
     """Return the exit code: 1 for a creature that is valid but does not stand."""
     options = parsed(CheckOptions, "check", arguments)
     folder = Path(options.env)
-    creature = load_folder(folder) if folder.is_dir() else load_creature(options.env)
+    creature = load_folder(folder) if folder.is_dir() else load_creature(options.env, tell=print)
     configured(creature, None, {}, WalkTargets())
     grows = creature.settings.creature.grows
     if not grows:
