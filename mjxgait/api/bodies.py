@@ -27,12 +27,12 @@ def import_model(
     force: bool = False,
     tell: Callable[[str], object] = lambda said: None,
 ) -> Creature:
-    """Make a creature folder from a model file (MJCF, URDF, BVH, GLB); return the creature.
+    """Make a creature folder from a model (MJCF, URDF, xacro, BVH, GLB); return the creature.
 
     Does the same as `mjxgait import` (docs/guide/your-own-body.md).
 
     Args:
-      model: the file.
+      model: the file, or robot:NAME.
       out: the folder to make.
       name: of the creature; by default the file's.
       search: further folders for meshes and includes.

@@ -31,7 +31,7 @@ def load_creature(
     tell: Callable[[str], object] = lambda said: None,
     way: str = "forward",
 ) -> Creature:
-    """Load a shipped creature by name, a creature folder, or a model file (MJCF, URDF).
+    """Load a shipped creature by name, a creature folder, a model file or `robot:NAME`.
 
     Args:
       scale: size factors of parts, by name pattern (docs/reference/creature-folder.md).
@@ -41,12 +41,12 @@ def load_creature(
     Raises:
       UserError: not found or not usable, with the reason.
     """
+    from mjxgait.importer import import_model, robot_name
+
     path = Path(env)
-    if not path.is_file():
+    if not path.is_file() and robot_name(env) is None:
         creature = load_folder(find_creature(str(env)))
     else:
-        from mjxgait.importer import import_model
-
         imported = import_model(path)
         tell(imported.notes.text())
         creature = load_files(imported.files)

@@ -10,6 +10,7 @@ import numpy as np
 
 from mjxgait.certification import criteria, trials
 from mjxgait.certification.acceptance import acceptance_of, how_simulated
+from mjxgait.certification.advice import FELL_AFTER, advised
 from mjxgait.certification.check_body import check_body
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
@@ -188,9 +189,11 @@ def certify(
     found += told_to_turn(creature, champion, config, draw, threads)
     tested = sorted((*seen.criteria, *found), key=lambda c: c.number)
     report = acceptance.report(seen.whole, config) | {"ground": str(creature.terrain)}
+    report |= _fell(np.split(outcome.fell, ends)[1])
     if pushed:
         sizes = (0.0, config.pushes.speed, *config.pushes.ladder)
         report |= _bears(dict(zip(sizes, (plain, *pushed), strict=True)))
+    report |= advised(tested, champion.task, report, creature)
     return Certificate(
         creature.name,
         creature.digest,
@@ -289,6 +292,12 @@ def _bears(shares: dict[float, float]) -> dict[str, object]:
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
     }
+
+
+def _fell(times: np.ndarray) -> dict[str, object]:
+    """Return the report's entry on falls from perturbed starts. times: [S] s, infinite without."""
+    fallen = times[np.isfinite(times)]
+    return {FELL_AFTER: float(fallen.mean())} if len(fallen) else {}
 
 
 def schema_of(task: str) -> int:

@@ -54,6 +54,7 @@ class _Report:
     ground: Text = FLAT
     duty_factor: dict[str, Number | None] = dataclasses.field(default_factory=dict)
     likeness: dict[str, Number | None] = dataclasses.field(default_factory=dict)
+    advice: list[Text] = dataclasses.field(default_factory=list)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import tyro
 
+from mjxgait.api import load_creature
 from mjxgait.certification.check_body import check_body
+from mjxgait.certification.feasibility import feasibility
 from mjxgait.cli.options import parsed
-from mjxgait.config.layers import find_creature
-from mjxgait.creature import load_creature
+from mjxgait.creature import load_creature as load_folder
 from mjxgait.errors import UserError
 from mjxgait.files import replaced, writing
 from mjxgait.tasks.walk.targets import WalkTargets, configured
@@ -18,12 +19,13 @@ from mjxgait.training.stored import require_writable
 
 @dataclasses.dataclass(frozen=True)
 class CheckOptions:
-    """Validate a creature folder, run a stand test of two seconds, and draw the creature.
+    """Validate a creature folder, predict whether it can walk, and draw the creature.
 
-    The picture marks its feet, axes and mirror pairs.
+    It stands for two seconds; strength, reach and room for strides are computed. The picture marks
+    its feet, axes and mirror pairs.
 
     Attributes:
-      env: Creature folder, or the name of a shipped creature.
+      env: Creature folder, name of a shipped creature, model file, or robot:NAME.
       out: The picture; by default <name>-check.png in the current folder.
     """
 
@@ -35,9 +37,10 @@ def check_command(arguments: Sequence[str]) -> int:
     """Return the exit code: 1 for a creature that is valid but does not stand."""
     options = parsed(CheckOptions, "check", arguments)
     folder = Path(options.env)
-    creature = load_creature(folder if folder.is_dir() else find_creature(options.env))
+    creature = load_folder(folder) if folder.is_dir() else load_creature(options.env, tell=print)
     configured(creature, None, {}, WalkTargets())
-    if not creature.settings.creature.grows:
+    grows = creature.settings.creature.grows
+    if not grows:
         check_body(creature)
     from mjxgait.importer.portrait import facts, portrait, standing
 
@@ -49,6 +52,8 @@ def check_command(arguments: Sequence[str]) -> int:
 
     held = standing(creature)
     print("\n".join(facts(creature, held)))
+    if not grows:
+        print("\n".join(feasibility(creature).lines()))
     if note := fallback_note(creature.evolution_model):
         print(note)
     with writing(out), replaced(out) as beside:

@@ -31,6 +31,7 @@ USES = {
     "tensorboard": "--log tensorboard",
     "wandb": "--log wandb",
     "gym": "Gymnasium",
+    "robots": "robots by name, xacro files",
 }
 """Extras of the package, and what each is for."""
 COMPILERS = ("cc", "gcc", "clang")

@@ -9,7 +9,9 @@ import numpy as np
 import tyro
 
 from mjxgait.api.bodies import into_folder
+from mjxgait.certification.feasibility import feasibility
 from mjxgait.cli.options import parsed
+from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices
 from mjxgait.importer.worker import GIGABYTES, SECONDS
@@ -21,10 +23,10 @@ Words = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 class ImportOptions:
     """Make a creature folder from a model file, and report every change and guess.
 
-    Reads MJCF, URDF, and a character's skeleton (BVH, or a skinned GLB).
+    Reads MJCF, URDF, xacro, and a character's skeleton (BVH, or a skinned GLB).
 
     Attributes:
-      model: The file.
+      model: The file; or robot:NAME, such as robot:go2, a robot of the package robot_descriptions.
       out: Folder to make.
       name: Name of the creature; by default the file's name.
       search: Further folder to search for meshes, package:// paths and includes; may be given
@@ -73,6 +75,8 @@ def import_command(arguments: Sequence[str]) -> int:
     imported = into_folder(options.model, options.out, choices, options.force)
     print(imported.notes.text())
     print(f"wrote {options.out}; look at it with: mjxgait check {options.out}")
+    for limit in feasibility(load_creature(options.out)).limits:
+        print(*limit)
     if not imported.stands:
         print(
             "It does not stand by itself; it may still learn to walk, or edit the keyframe in "

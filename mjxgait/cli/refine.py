@@ -167,7 +167,10 @@ def _run(
     _tell(folder, creature)
     certified = Run(folder).certified
     if not certified:
-        screen.say("With less of the original it may walk: a smaller --keep")
+        screen.say(
+            "With less of the original it may walk: a smaller --keep. The keys named above go into "
+            "a file for --config"
+        )
     screen.next_steps(folder, certified)
     return 0
 

@@ -23,8 +23,8 @@ class TrainOptions(Verbosity):
     or FILE.py:CLASS of your own (docs/guide/your-own-task.md).
 
     Attributes:
-      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to
-        import on the fly.
+      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF, URDF) or
+        robot:NAME to import on the fly.
       config: TOML file with settings, or the name of a shipped config such as wilson.
       scale: Size factors of parts, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
         (docs/reference/creature-folder.md). Lengths, masses and inertias follow, gains do not.

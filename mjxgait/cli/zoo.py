@@ -72,6 +72,10 @@ def _leave(zoo: Path, name: str, folders: list[Path], output: Output) -> None:
             drawing.savefig(beside)
     count = sum(one.certified for one in found)
     output.console.print(f"{count} of {len(found)} are certified: {zoo / PICTURE}")
+    tried = [one for one in found if one.margin is not None]
+    if tried and not count:
+        nearest = max(tried, key=lambda one: one.margin or 0.0)
+        output.console.print(" ".join((f"{nearest.folder.name}:", *nearest.advice)))
 
 
 class _Screen:

@@ -38,7 +38,7 @@ class Footfalls:
 
 def textbook_cycle(creature: Creature, falls: Footfalls, poses: int) -> np.ndarray:
     """Angles [C, J] rad, within the pose ranges, at `poses` moments of the cycle."""
-    legs = [_Leg(creature, foot) for foot in range(len(creature.feet.names))]
+    legs = [Leg(creature, foot) for foot in range(len(creature.feet.names))]
     cycle = np.tile(creature.joints.stand, (poses, 1))
     for leg, phase in zip(legs, falls.phases, strict=True):
         # Twice around: in the second round the first moment, too, starts from the one before it.
@@ -57,10 +57,13 @@ def _path(share: float, falls: Footfalls) -> tuple[float, float]:
     return -half * np.cos(np.pi * swing), falls.lift * np.sin(np.pi * swing)
 
 
-class _Leg:
-    """The joints that move one foot and no other, and their kinematics."""
+class Leg:
+    """The joints that move one foot and no other, and their kinematics.
 
-    def __init__(self, creature: Creature, foot: int) -> None:
+    sideways: weight of a foot's distance to the side of its place, against that ahead or above.
+    """
+
+    def __init__(self, creature: Creature, foot: int, sideways: float = 1.0) -> None:
         model, feet = creature.model, creature.feet
         self.creature, self.model = creature, model
         self.data = mujoco.MjData(model)
@@ -77,15 +80,17 @@ class _Leg:
         self.place, self.level = place, self.data.xmat[self.body].reshape(3, 3).copy()
         nose = self.data.xmat[creature.trunk].reshape(3, 3) @ creature.frame.forward * [1, 1, 0]
         self.ahead = nose / np.linalg.norm(nose)
+        left = np.cross([0.0, 0.0, 1.0], self.ahead)
+        self.counts = np.eye(3) - (1.0 - sideways) * np.outer(left, left)
 
-    def reach(self, path: tuple[float, float], pose: np.ndarray) -> np.ndarray:
+    def reach(
+        self, path: tuple[float, float], pose: np.ndarray, crouch: float = CROUCH
+    ) -> np.ndarray:
         """Angles of the leg's joints [j] that bring the foot nearest to a place.
 
-        Damped least squares, starting from a pose [J].
+        Damped least squares, starting from a pose [J]. crouch: hip heights.
         """
-        hip, joints = self.creature.frame.hip_height, self.creature.joints
-        ahead, above = path
-        goal = self.place + ahead * self.ahead + [0, 0, above + CROUCH * hip]
+        joints, goal = self.creature.joints, self._goal(path, crouch)
         pose = pose.copy()
         low, high = joints.pose_low[self.joints], joints.pose_high[self.joints]
         for _ in range(ROUNDS):
@@ -94,6 +99,17 @@ class _Leg:
             moved = pose[self.joints] + np.linalg.solve(square, slopes.T @ off)
             pose[self.joints] = np.clip(moved, low, high)
         return pose[self.joints]
+
+    def missed(self, path: tuple[float, float], pose: np.ndarray, crouch: float = CROUCH) -> float:
+        """Distance of the foot in a pose [J] from a place, in hip heights."""
+        off, _ = self._off(self._goal(path, crouch), pose)
+        return float(np.linalg.norm(off[:3]))
+
+    def _goal(self, path: tuple[float, float], crouch: float) -> np.ndarray:
+        """Place [3] in m of the foot, ahead of and above where it stands."""
+        ahead, above = path
+        up = above + crouch * self.creature.frame.hip_height
+        return np.asarray(self.place + ahead * self.ahead + [0, 0, up])
 
     def _off(self, goal: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Error [6] to the goal, in hip heights, and its slopes [6, j]."""
@@ -104,8 +120,8 @@ class _Leg:
         mujoco.mj_jac(self.model, self.data, moves, turns, point, self.body)
         dofs = self.creature.joints.dof_adr[self.joints]
         tilt = 0.5 * sum(np.cross(turned[:, axis], self.level[:, axis]) for axis in range(3))
-        off = np.concatenate([(goal - point) / hip, TURN * tilt])
-        return off, np.concatenate([moves[:, dofs] / hip, TURN * turns[:, dofs]])
+        off = np.concatenate([self.counts @ (goal - point) / hip, TURN * tilt])
+        return off, np.concatenate([self.counts @ moves[:, dofs] / hip, TURN * turns[:, dofs]])
 
     def _pose(self, pose: np.ndarray) -> None:
         self.data.qpos[:] = self.creature.stand_qpos

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from mjxgait.certification import read_certificate, verdict_of
+from mjxgait.certification.advice import ADVICE
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import STRICT, Whole, build, dump_toml, read_toml
 from mjxgait.creature import Creature
@@ -129,7 +130,10 @@ SIZE = (420, 300)
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """Result of one run. summary: the certificate's; margin: None if not examined."""
+    """Result of one run.
+
+    summary, advice: the certificate's. margin: None if not examined.
+    """
 
     folder: Path
     examined: bool
@@ -138,6 +142,7 @@ class Found:
     margin: float | None
     verdict: str
     """Result in a few words."""
+    advice: tuple[str, ...] = ()
 
 
 def found_in(folders: Sequence[Path]) -> list[Found]:
@@ -184,5 +189,7 @@ def _found(folder: Path) -> Found:
     document = read_certificate(folder / CERTIFICATE)
     if document is None:
         return Found(folder, False, False, "", None, "not examined")
-    verdict, summary = verdict_of(document), document.get("report", {}).get("summary", "")
-    return Found(folder, True, verdict.certified, summary, verdict.margin, verdict.in_words())
+    verdict, report = verdict_of(document), document.get("report", {})
+    said = () if verdict.passed else tuple(report.get(ADVICE, ()))
+    summary, words = report.get("summary", ""), verdict.in_words()
+    return Found(folder, True, verdict.certified, summary, verdict.margin, words, said)

@@ -7,5 +7,6 @@ from mjxgait.importer.convert import (
     Imported,
     import_model,
 )
+from mjxgait.importer.robots import robot_name
 
-__all__ = ["TOML", "WRITTEN", "ImportChoices", "Imported", "import_model"]
+__all__ = ["TOML", "WRITTEN", "ImportChoices", "Imported", "import_model", "robot_name"]

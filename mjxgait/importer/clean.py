@@ -192,8 +192,7 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
         for element in robot.iter()
     ):
         raise UserError(
-            f"{path}: is a xacro template; run `xacro {path.name} > robot.urdf` first and import "
-            "robot.urdf"
+            f"{path}: is a xacro template; give it the suffix .xacro, so that it is expanded first"
         )
     for element in list(robot):
         if element.tag not in KEPT:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 from mjxgait.animation.clips.clip import ELSEWHERE
 from mjxgait.creature import geometry
 from mjxgait.errors import UserError
+from mjxgait.files import read_bytes
 from mjxgait.importer.anatomy import in_plane
 from mjxgait.importer.balance import steady_balance
 from mjxgait.importer.body import KinematicModel
@@ -25,7 +27,8 @@ from mjxgait.importer.orient import (
     yaw_to,
 )
 from mjxgait.importer.rigged import RIGS, model_of
-from mjxgait.importer.source import Places, Source, parse_xml
+from mjxgait.importer.robots import find_robot, robot_name
+from mjxgait.importer.source import MOST_XML, Places, Source, parse_text, parse_xml
 from mjxgait.importer.spec import add_joints, creature_xml, place_bodies
 from mjxgait.importer.stance import stance_of
 from mjxgait.importer.standing import (
@@ -41,6 +44,7 @@ from mjxgait.importer.worker import (
     compile_here,
 )
 from mjxgait.importer.write_toml import Settings, creature_toml, manner
+from mjxgait.importer.xacro import TEMPLATE, expanded
 
 XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
 """Files of a creature folder that an import makes."""
@@ -81,13 +85,22 @@ class Imported:
 
 
 def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
-    """Import a creature from an MJCF or URDF file, or from a skeleton (BVH, skinned GLB).
+    """Import a creature from an MJCF, URDF or xacro file, or from a skeleton (BVH, skinned GLB).
+
+    path: of the file; or `robot:NAME`, a robot of the package robot_descriptions.
 
     Raises:
       UserError: the file cannot be read, or the model cannot walk; names the element and the
         remedy.
     """
     choices, notes = choices or ImportChoices(), Notes()
+    if name := robot_name(path):
+        robot = find_robot(name)
+        search = (*choices.search, *robot.search)
+        path, choices = (
+            robot.file,
+            dataclasses.replace(choices, name=choices.name or name, search=search),
+        )
     try:
         return _import(path, choices, notes)
     except UserError as error:
@@ -146,7 +159,10 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     steady_balance(
         best.drive, best.kinematics.names, best.kinematics.model, best.qpos, soles, best.notes
     )
-    name = plain_names([choices.name or path.stem], ["creature"])[0].strip(".-") or "creature"
+    name = (
+        plain_names([choices.name or path.stem.removesuffix(".urdf")], ["creature"])[0].strip(".-")
+        or "creature"
+    )
     if rest is not None:
         rest[:3] = best.qpos[:3]
     bones = {
@@ -177,8 +193,7 @@ def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:
     Raises:
       UserError: it cannot be read, or is neither MJCF nor URDF.
     """
-    source = Source(parse_xml(path))
-    places = Places(path, search)
+    source, places = Source(_parsed(path, search)), Places(path, search)
     match source.tree.tag:
         case "mujoco":
             clean_mjcf(source, path, places, notes)
@@ -189,6 +204,13 @@ def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:
                 f"{path}: begins with <{other[:40]}>; a model file begins with <mujoco> (MJCF) or <robot> (URDF)"
             )
     return source
+
+
+def _parsed(path: Path, search: Sequence[Path]) -> ET.Element:
+    if path.suffix.lower() == TEMPLATE:
+        read_bytes(path, MOST_XML)
+        return parse_text(expanded(path, search), path)
+    return parse_xml(path)
 
 
 def _folder(

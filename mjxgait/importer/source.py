@@ -94,7 +94,11 @@ def parse_xml(path: Path) -> ET.Element:
       UserError: missing, too large, not XML, with a document type (entities can refer to files and
         grow without bound) or too deep.
     """
-    data = read_bytes(path, MOST_XML)
+    return parse_text(read_bytes(path, MOST_XML), path)
+
+
+def parse_text(data: bytes, path: Path) -> ET.Element:
+    """Parse the root element of a text. path: its file, for messages; see `parse_xml`."""
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data or b"\0" in data:
         raise UserError(
             f"{path}: has a document type, entities or zero bytes, which are not read; save it as "

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from mjxgait.certification import Certificate
 from mjxgait.certification.acceptance import acceptance_of
+from mjxgait.certification.advice import ADVICE
 from mjxgait.certification.describe import in_words
 from mjxgait.config.schema import Config
 from mjxgait.creature.ground.spec import FLAT
@@ -146,11 +147,15 @@ class Screen(Output):
         # The other numbers mean little for a motion that makes no headway.
         if stopped := report.get("obstacle"):
             self.console.print(f"{verdict}: it {stopped}{where}; {certificate.seconds:.0f} s.")
-            return
-        self.console.print(
-            f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}{where}; "
-            f"{certificate.seconds:.0f} s."
-        )
+        else:
+            self._numbers(certificate, f"{verdict} (margin {certificate.margin:.2f})", where)
+        for sentence in report.get(ADVICE, ()):
+            self.console.print(sentence)
+
+    def _numbers(self, certificate: Certificate, verdict: str, where: str) -> None:
+        """Print the verdict with the numbers of a motion. where: its ground, in words."""
+        report = certificate.report
+        self.console.print(f"{verdict}. {report['summary']}{where}; {certificate.seconds:.0f} s.")
         if like := in_words(report):
             self.console.print(like)
         self.console.print(

@@ -13,6 +13,8 @@ from mjxgait.certification import (
     read_stress,
     verdict_of,
 )
+from mjxgait.certification.advice import ADVICE
+from mjxgait.certification.verdict import Document
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.training.folder import CERTIFICATE, STRESS
@@ -62,9 +64,10 @@ def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:
         for m in c.measures
     ]
     measured = table(("criterion", "measure", "value", "wanted", "verdict"), rows)
-    said = html.escape(_said(verdict_of(document)))
+    verdict = verdict_of(document)
+    said, advised = html.escape(_said(verdict)), _advice(document, verdict)
     folded = f"<details><summary>All measures</summary>{measured}</details>"
-    return f"<p>{said}</p>{folded}{_anywhere(run, champion)}<p>{CHECK}</p>"
+    return f"<p>{said}</p>{advised}{folded}{_anywhere(run, champion)}<p>{CHECK}</p>"
 
 
 def _said(verdict: Verdict) -> str:
@@ -73,6 +76,12 @@ def _said(verdict: Verdict) -> str:
     if verdict.reservation:
         return f"Not certified. {said}, but {verdict.reservation}."
     return f"{said}."
+
+
+def _advice(document: Document, verdict: Verdict) -> str:
+    """What stood in the way and what to try, as a paragraph; empty for what passes."""
+    said = [] if verdict.passed else document.get("report", {}).get(ADVICE, [])
+    return f"<p>{html.escape(' '.join(said))}</p>" if said else ""
 
 
 def _anywhere(run: Path, champion: Champion) -> str:

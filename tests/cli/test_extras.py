@@ -43,7 +43,7 @@ def test_named_extras_exist():
         for text in file.read_text(encoding="utf-8").splitlines()
         if "install_command('" in text
     }
-    assert used == {"video", "usd", "cluster", "peers", "pandas", "gym"}
+    assert used == {"video", "usd", "cluster", "peers", "pandas", "gym", "robots"}
     assert used | set(KINDS) <= known.keys()
 
 

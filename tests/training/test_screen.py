@@ -9,6 +9,7 @@ from helpers import small_config
 from rich.console import Console
 
 from mjxgait.certification import Certificate, CertificateConfig
+from mjxgait.certification.advice import ADVICE, advice
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.training.screen import Screen, duration
 
@@ -114,3 +115,14 @@ def test_durations_have_a_suitable_unit():
         "118 min",
         "2.5 h",
     ]
+
+
+def test_what_stood_in_the_way_follows_the_verdict():
+    out = io.StringIO()
+    criterion = Criterion(8, "physics", (Measure("body speed / sqrt(g h)", 3.8, "<=", 3.0, 1.0),))
+    said = advice([criterion], "walk", {})
+    report = {"summary": "trot, 0.80 m/s", "overlap": None, ADVICE: said}
+    config = CertificateConfig()
+    screen = Screen(Console(file=out, width=300))
+    screen.certificate(Certificate("stool", "", "walk", "", (criterion,), report, config, 1.0))
+    assert out.getvalue().splitlines()[-2:] == said

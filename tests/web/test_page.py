@@ -171,6 +171,10 @@ def test_only_a_certificate_of_this_champion_is_shown(stool, tmp_path):
     (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
     assert "Not all criteria pass." in certificate_table(run, stool, champion)
     assert "slip &lt;or&gt; slide" in certificate_table(run, stool, champion)
+    told = {"report": CERTIFIED["report"] | {"advice": ["It <slides>.", "Train longer."]}}
+    text = json.dumps(CERTIFIED | told | {"champion": champion.fingerprint})
+    (run / CERTIFICATE).write_text(text)
+    assert "<p>It &lt;slides&gt;. Train longer.</p>" in certificate_table(run, stool, champion)
     assert "outdated" in certificate_table(run, stool, treading(stool, degrees=3.0))
     (run / CERTIFICATE).write_text(json.dumps(CERTIFIED))
     assert "outdated" in certificate_table(run, stool, champion)
