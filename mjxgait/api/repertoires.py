@@ -29,12 +29,13 @@ from mjxgait.training.folder import (
 from mjxgait.training.stored import disk_errors, locked
 
 if TYPE_CHECKING:
+    from mjxgait.animation.export import Character
     from mjxgait.distributed.jobs import Advanced
 
 MAP = "map.png"
 SPEEDS = ("0.3bl/s", "0.5bl/s", "0.7bl/s", "0.9bl/s", "1.1bl/s")
 TURNS = (10.0, 20.0)
-OF_FILES = ("rate", "travelling", "blends", "cluster")
+OF_FILES = ("rate", "travelling", "blends", "cluster", "onto")
 """Options that do not affect the walks."""
 
 
@@ -63,6 +64,8 @@ class RepertoireRequest:
       physics: mjx simulates with MJX itself instead of this program's faster step.
       rate: Key frames per second of the clips.
       travelling: Move the root in the clips; otherwise the creature walks in place.
+      onto: The character (GLB) that the creature was imported from; its file gets the clips, with
+        its own mesh.
       blends: Test in C MuJoCo also the blends half way between neighbours, and changes from one to
         the other while walking.
       cluster: Evolve on a Ray cluster: HOST:PORT, or auto (docs/guide/cluster.md).
@@ -82,6 +85,7 @@ class RepertoireRequest:
     physics: Physics | None = None
     rate: Literal[24, 30, 60] = 60
     travelling: bool = False
+    onto: Path | None = None
     blends: bool = True
     cluster: str | None = None
 
@@ -100,6 +104,7 @@ def repertoire(
     seed: int | None = None,
     rate: Literal[24, 30, 60] = 60,
     travelling: bool = False,
+    onto: Place | None = None,
     blends: bool = True,
     quiet: bool = False,
 ) -> Path:
@@ -118,6 +123,7 @@ def repertoire(
       seed: of all random numbers.
       rate: key frames per second of the clips.
       travelling: moves the root in the clips.
+      onto: the character (GLB) that the creature was imported from, whose file gets the clips.
       blends: tests blends and changes between neighbours too.
       quiet: prints nothing.
 
@@ -137,6 +143,7 @@ def repertoire(
         seed=seed,
         rate=rate,
         travelling=travelling,
+        onto=None if onto is None else Path(onto),
         blends=blends,
     )
     folder, ended = gather(request, Output(Console(quiet=True) if quiet else None))
@@ -170,6 +177,7 @@ def gather(request: RepertoireRequest, output: Output) -> tuple[Path, bool]:
             begin(plan)
         with locked(folder):
             creature, told = open_run(folder / grid.cells[0].name)[0], interrupted.is_set
+            character = _character(request.onto, creature)
             ended = evolve(folder, creature, grid, scheduler, screen.evolved, told)
             walks = [folder / cell.name for cell in grid.cells]
             again = f"mjxgait repertoire --resume {folder}"
@@ -177,7 +185,7 @@ def gather(request: RepertoireRequest, output: Output) -> tuple[Path, bool]:
     if not ended:
         output.console.print(f"interrupted; go on with: mjxgait repertoire --resume {folder}")
         return folder, False
-    _leave(folder, creature, grid, request, screen)
+    _leave(folder, creature, grid, request, screen, character)
     output.say(f"{time.perf_counter() - began:.0f} s; each walk is a run: mjxgait inspect {folder}")
     return folder, True
 
@@ -209,6 +217,7 @@ def planned(
     base = _settings(options, creature)
     check(base)
     check_parts(creature, base)
+    _character(options.onto, creature)
     folder = options.out or Path("runs") / f"repertoire-{creature.name}"
     if is_taken(folder):
         raise UserError(
@@ -238,6 +247,21 @@ def begin(plan: Planned) -> None:
         write_text(folder / GRID, plan.grid.text)
 
 
+def _character(onto: Path | None, creature: Creature) -> "Character | None":
+    """Return the character that gets the clips.
+
+    Raises:
+      UserError: the file cannot be read, or has not the creature's skeleton.
+    """
+    if onto is None:
+        return None
+    from mjxgait.animation.export import bones_of, read_character
+
+    character = read_character(onto)
+    bones_of(creature, character)
+    return character
+
+
 def _resumed(options: RepertoireRequest) -> tuple[Path, Grid]:
     folder = options.resume
     assert folder is not None
@@ -263,7 +287,12 @@ def _settings(options: RepertoireRequest, creature: Creature) -> Config:
 
 
 def _leave(
-    folder: Path, creature: Creature, grid: Grid, options: RepertoireRequest, screen: "_Screen"
+    folder: Path,
+    creature: Creature,
+    grid: Grid,
+    options: RepertoireRequest,
+    screen: "_Screen",
+    character: "Character | None",
 ) -> None:
     """Write the map, and the clips if there are any."""
     from mjxgait.experiments.repertoire.clips import (
@@ -301,7 +330,7 @@ def _leave(
         ways = transitions(found, loops)
         console.print(f"from standing, and to a stand: {sum(map(bool, ways))} of {len(ways)} found")
         files = folder / CLIPS, folder / TABLE
-        write_clips(*files, loops, found, between, changed, ways, options.travelling)
+        write_clips(*files, loops, found, between, changed, ways, options.travelling, character)
         count = len(loops) + sum(map(bool, ways))
         console.print(f"{count} clips: {files[0]}, their places: {files[1]}")
 

@@ -1,6 +1,7 @@
 """A walk on the user's own character: its skin moves as the simulated body, and nothing else."""
 
 import dataclasses
+import json
 from functools import cached_property
 from pathlib import Path
 
@@ -13,11 +14,12 @@ from animation.test_glb import read
 from importer.rigs import DOG, bvh, glb
 from scipy.spatial.transform import Rotation
 
-from mjxgait.animation.export import WalkLoop, export_onto, read_character
+from mjxgait.animation.export import WalkLoop, export_onto, read_character, standing_still
 from mjxgait.animation.export.footfalls import footfalls, stances
 from mjxgait.animation.export.onto import build_onto
 from mjxgait.animation.keys import bring
 from mjxgait.creature.scale import load_files
+from mjxgait.experiments.repertoire.clips import CLIPS, TABLE, write_clips
 from mjxgait.importer import ImportChoices, import_model
 
 ARMATURES = {
@@ -288,3 +290,26 @@ def test_footfalls_are_where_the_feet_are_down(case: Case):
         assert 0 <= fall.down < loop.times[-1]
         frames = np.arange(round(fall.down / step), round(fall.up / step)) % len(height)
         assert np.median(height[frames, fall.foot]) < 0.01 * hip
+
+
+def test_a_repertoire_is_written_onto_the_character(case: Case, tmp_path: Path):
+    """All clips move the same bones; each shows what it shows alone."""
+    before = tmp_path / "before.glb"
+    export_onto(case.loop, read_character(case.file), before)  # so that a name is taken
+    loops = {"idle": standing_still(case.loop), "walk": case.loop}
+    files = tmp_path / CLIPS, tmp_path / TABLE
+    write_clips(*files, loops, [], [], [], [], False, read_character(before))
+    document = gltf.GLTF2.load_from_bytes(files[0].read_bytes())
+    first, idle, walk = document.animations
+    assert [first.name, idle.name, walk.name] == ["walk-loop", "idle", "walk_2-loop"]
+    table = json.loads(files[1].read_text())
+    assert [clip["animation"] for clip in table["clips"]] == ["idle", "walk_2-loop"]
+    idles, walks = (
+        {(channel.target.node, channel.target.path) for channel in clip.channels}
+        for clip in (idle, walk)
+    )
+    assert idles == walks
+    alone, again = (seen(case, document, name) for name in ("walk-loop", "walk_2-loop"))
+    np.testing.assert_allclose(again, alone, atol=1e-6)
+    assert np.ptp(seen(case, document, "idle"), axis=0).max() < 1e-6
+    assert PICTURE in files[0].read_bytes()

@@ -6,7 +6,7 @@ Letters: `S` ways to stop, `T` frames, `J` actuated joints.
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,10 @@ import numpy as np
 
 from mjxgait.animation.export import (
     LOOP,
+    Character,
     WalkLoop,
     build_clips,
+    build_onto,
     contacts,
     falls_of_first_foot,
     resampled,
@@ -23,6 +25,7 @@ from mjxgait.animation.export import (
     stride_in_phase,
 )
 from mjxgait.certification.trials import simulate
+from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.experiments.repertoire.found import Found, found_in
 from mjxgait.experiments.repertoire.grid import Grid
@@ -212,17 +215,41 @@ def write_clips(
     changed: Sequence[Change],
     ways: Sequence[Transition],
     travelling: bool,
+    character: Character | None = None,
 ) -> None:
-    """Write the GLB and the JSON beside it."""
+    """Write the GLB and the JSON beside it.
+
+    character: gets the clips, instead of the creature's body.
+
+    Raises:
+      UserError: the character has not the creature's skeleton, or a file cannot be written.
+    """
     document = table_of(file.name, loops, found, travelling)
     document["blends"] = [blend.entry for blend in between]
     document["changes"] = [change.entry for change in changed]
     document["transitions"] = [way.entry for way in ways]
     clips = {animation_of(name, loop): loop for name, loop in loops.items()}
     clips |= {way.name: way.loop for way in ways if way.loop is not None}
+    if character is None:
+        data = build_clips(clips, travelling)
+    else:
+        names, data = build_onto(clips, character, travelling)
+        _rename(document, names, next(iter(loops.values())).walk.creature)
     with disk_errors(file.parent):
-        write_bytes(file, build_clips(clips, travelling))
+        write_bytes(file, data)
         write_text(table, json.dumps(document, indent=2) + "\n")
+
+
+def _rename(document: dict[str, Any], names: Mapping[str, str], creature: Creature) -> None:
+    """Put the names of a character's animations and bones into the table."""
+    bones = creature.settings.rig.bones
+    for entry in document["clips"]:
+        entry["animation"] = names[entry["animation"]]
+        for fall in entry.get("contacts", []):
+            fall["foot"] = bones.get(fall["foot"], fall["foot"])
+    for entry in document["transitions"]:
+        if entry["found"]:
+            entry["animation"] = names[entry["name"]]
 
 
 def table_of(

@@ -12,6 +12,7 @@ import pygltflib as gltf
 import pytest
 from experiments.repertoire.made_up import CERTIFIED, GENERATIONS, begin, examine
 from helpers import STOOL, said_by
+from importer.rigs import glb
 from made_up_hands import Interrupted, Pretend
 from rendering.made_up import treading
 
@@ -113,6 +114,17 @@ def test_certified_walks_become_clips_with_table_entries(
     assert {fall["foot"] for fall in turning["contacts"]} <= {n.name for n in document.nodes}
     assert [place["fails"] for place in table["not_certified"]] == [["progress"]] * 4
     assert (folder / "map.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_character_that_the_creature_was_not_made_of_is_refused(
+    examined: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+):
+    (tmp_path / "dog.glb").write_bytes(glb())
+    before = {file: file.read_bytes() for file in examined.glob("*.*")}
+    given = ["repertoire", "--resume", examined, "--onto", tmp_path / "dog.glb"]
+    said = said_by(capsys, *given, code=2)
+    assert "was not made of a character's skeleton" in said
+    assert {file: file.read_bytes() for file in examined.glob("*.*")} == before
 
 
 def test_half_way_is_the_mean_of_two_controllers(stool: Creature):
