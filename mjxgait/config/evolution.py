@@ -1,4 +1,4 @@
-"""Settings of the genetic algorithm, as frozen dataclasses."""
+"""Settings of the search, as frozen dataclasses."""
 
 import dataclasses
 from typing import Annotated, Literal
@@ -75,12 +75,12 @@ class ForcedConfig:
 
 @dataclasses.dataclass(frozen=True)
 class EvolutionConfig:
-    """Genetic algorithm; see `mjxgait/evolution/breeding.py` for draws of parents and children.
+    """Search; see `mjxgait/evolution/breeding.py` for draws of parents and children.
 
     Attributes:
       search: how children come about: `ga` breeds them from parents; `es` draws them all from a
         distribution that it learns (separable CMA-ES), for genomes of bounded reals. Then settings
-        of parents, crossover, mutation and forced evolution do nothing, except sigma.
+        of parents, crossover, mutation, lineages and forced evolution do nothing, except sigma.
       population: P, individuals that survive from one generation to the next.
       generations: maximum number of generations.
       target: fitness at which a run stops.
@@ -177,13 +177,9 @@ class EvolutionConfig:
         if (self.proportional or self.follows) and not at_once:
             which = "proportional" if self.proportional else "lineage or family"
             raise ValueError(f"{which} is for children that are born all at once")
-        if self.search == "es" and self.follows:
+        if self.search == "es" and self.offspring - self.elites < 2:
             raise ValueError(
-                'lineage or family is for search = "ga": an evolution strategy has no mothers'
-            )
-        if self.search == "es" and self.offspring - self.elites < 4:
-            raise ValueError(
-                f'search = "es" learns from at least 4 children of a generation, and these settings '
+                f'search = "es" learns from at least 2 children of a generation, and these settings '
                 f"leave {self.offspring - self.elites}; make population or growth larger"
             )
         if self.elite and self.survival == "best":
@@ -199,8 +195,8 @@ class EvolutionConfig:
 
     @property
     def follows(self) -> bool:
-        """Tell whether mothers are recorded."""
-        return self.lineage or self.family < 1
+        """Tell whether mothers are recorded; children that a strategy draws have none."""
+        return self.search == "ga" and (self.lineage or self.family < 1)
 
     @property
     def offspring(self) -> int:

@@ -55,7 +55,7 @@ class Evolution:
         key, key_create = jax.random.split(key)
         count, window = self.config.population, self.config.forced.window
         integer = jnp.zeros((), jnp.int32)
-        genomes = self.variation.begin(key_create, count)
+        genomes, follows = self.variation.begin(key_create, count), self.config.follows
         return EvolutionState(
             genomes=genomes,
             terms=jnp.zeros((count, trials, terms)),
@@ -75,7 +75,7 @@ class Evolution:
             spell_best=jnp.float32(-jnp.inf),
             barren=integer,
             rounds=jnp.ones(count) if self.config.remember else None,
-            family=jnp.arange(count) if self.config.family < 1 else None,
+            family=jnp.arange(count) if follows and self.config.family < 1 else None,
             normal=self._strategy.begun(genomes) if self.config.search == "es" else None,
         )
 
