@@ -1,9 +1,9 @@
 """Evolution: one generation as a pure function of its state, for any kind of genome.
 
 The children are bred (`breeding.py`) or drawn from a distribution (`strategy.py`); all else is the
-same for both. A run begins with a population that has not been evaluated (`seeding`). The first call evaluates it,
-so that the physics is traced and compiled once. Forced evolution (Wilson) fills the same offspring
-slots in another way, chosen by a flag in the state.
+same for both. A run begins with a population that has not been evaluated (`seeding`). The first
+call evaluates it, so that the physics is traced and compiled once. Forced evolution (Wilson) fills
+the same offspring slots in another way, chosen by a flag in the state.
 """
 
 import dataclasses
