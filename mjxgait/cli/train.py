@@ -217,6 +217,7 @@ def _settings(options: TrainOptions) -> Config:
         "population": options.population,
         "generations": options.generations,
         "body": options.evolve_body,
+        "search": options.search,
     }
     table = {
         "use": dataclasses.asdict(meant(options.settings.use)),

@@ -42,6 +42,8 @@ class TrainOptions(Verbosity):
       generation: With --resume: the checkpoint to continue from, instead of the latest.
       population: Individuals of a generation; short for --evolution.population.
       generations: Most generations of the run; short for --evolution.generations.
+      search: ga, the genetic algorithm, or es, an evolution strategy; short for --evolution.search
+        (docs/reference/algorithm.md).
       evolve_body: Short for --evolution.body: 1.25 lets the parts below the trunk become up to a
         quarter larger or a fifth smaller; the run stores the winning body in body/.
       speed: Target speed: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
@@ -79,6 +81,7 @@ class TrainOptions(Verbosity):
     generation: int | None = None
     population: int | None = None
     generations: int | None = None
+    search: Literal["ga", "es"] | None = None
     evolve_body: float | None = None
     speed: str | None = None
     gait: str | None = None

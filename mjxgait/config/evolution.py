@@ -1,4 +1,4 @@
-"""Settings of the genetic algorithm, as frozen dataclasses."""
+"""Settings of the search, as frozen dataclasses."""
 
 import dataclasses
 from typing import Annotated, Literal
@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import pydantic
 
 from mjxgait.config.tables import (
+    ADDED,
     HOST,
     SHAPE,
     STRICT,
@@ -74,9 +75,12 @@ class ForcedConfig:
 
 @dataclasses.dataclass(frozen=True)
 class EvolutionConfig:
-    """Genetic algorithm; see `mjxgait/evolution/breeding.py` for draws of parents and children.
+    """Search; see `mjxgait/evolution/breeding.py` for draws of parents and children.
 
     Attributes:
+      search: how children come about: `ga` breeds them from parents; `es` draws them all from a
+        distribution that it learns (separable CMA-ES), for genomes of bounded reals. Then settings
+        of parents, crossover, mutation, lineages and forced evolution do nothing, except sigma.
       population: P, individuals that survive from one generation to the next.
       generations: maximum number of generations.
       target: fitness at which a run stops.
@@ -108,7 +112,8 @@ class EvolutionConfig:
         one of them, or re-draw all eight, as classic GAs do.
       redrawn: share of `mixed` mutations that re-draw.
       mutation_rate: share of offspring mutated.
-      sigma: standard deviation of the gaussian mutation, in units of the range of each joint.
+      sigma: standard deviation of the gaussian mutation, in units of the range of each joint; of an
+        evolution strategy, the first one of every gene.
       body: largest factor by which the parts below the trunk may grow or shrink, each mirrored pair
         by a gene of its own (docs/reference/creature-folder.md); 1 leaves the body unchanged.
       tuning_rate: chance that a tuning gene of a mutated offspring changes; likewise a body gene.
@@ -125,6 +130,7 @@ class EvolutionConfig:
     """
 
     __pydantic_config__ = STRICT
+    search: Annotated[Literal["ga", "es"], SHAPE, ADDED] = "ga"
     population: Annotated[Count, SHAPE] = 256
     generations: Annotated[Whole, HOST] = 75
     target: Annotated[Finite | None, HOST] = None
@@ -171,6 +177,11 @@ class EvolutionConfig:
         if (self.proportional or self.follows) and not at_once:
             which = "proportional" if self.proportional else "lineage or family"
             raise ValueError(f"{which} is for children that are born all at once")
+        if self.search == "es" and self.offspring - self.elites < 2:
+            raise ValueError(
+                f'search = "es" learns from at least 2 children of a generation, and these settings '
+                f"leave {self.offspring - self.elites}; make population or growth larger"
+            )
         if self.elite and self.survival == "best":
             raise ValueError(
                 'elite is for survival = "children": of the best all live on anyway; set it to 0'
@@ -184,8 +195,8 @@ class EvolutionConfig:
 
     @property
     def follows(self) -> bool:
-        """Tell whether mothers are recorded."""
-        return self.lineage or self.family < 1
+        """Tell whether mothers are recorded; children that a strategy draws have none."""
+        return self.search == "ga" and (self.lineage or self.family < 1)
 
     @property
     def offspring(self) -> int:

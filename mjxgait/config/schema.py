@@ -205,7 +205,7 @@ class Config:
       drive: Motor settings.
       rollout: Evaluation of individuals.
       fitness: Fitness terms and their weights.
-      evolution: The genetic algorithm.
+      evolution: The search: a genetic algorithm, or an evolution strategy.
       examination: Choice of the champion to examine.
     """
 

@@ -224,7 +224,10 @@ class BodiedController:
         if first is not None:  # sizes 0: the creature's own body
             count = jax.tree.leaves(first)[0].shape[0]
             first = Bodied(first, jnp.zeros((count, self.sizes)))
-        return Variation(create, cross, mutate, long=own.long, first=first)
+        whole = None
+        if own.box is not None:
+            whole = Box(Bodied(own.box.low, box.low), Bodied(own.box.high, box.high))
+        return Variation(create, cross, mutate, long=own.long, first=first, box=whole)
 
     def genes(self, genomes: Bodied, settings: object) -> np.ndarray:
         """See `Controller`."""

@@ -1,8 +1,9 @@
-"""Genetic algorithm: one generation as a pure function of its state, for any kind of genome.
+"""Evolution: one generation as a pure function of its state, for any kind of genome.
 
-A run begins with a population that has not been evaluated (`seeding`). The first call evaluates it,
-so that the physics is traced and compiled once. Forced evolution (Wilson) fills the same offspring
-slots in another way, chosen by a flag in the state.
+The children are bred (`breeding.py`) or drawn from a distribution (`strategy.py`); all else is the
+same for both. A run begins with a population that has not been evaluated (`seeding`). The first
+call evaluates it, so that the physics is traced and compiled once. Forced evolution (Wilson) fills
+the same offspring slots in another way, chosen by a flag in the state.
 """
 
 import dataclasses
@@ -32,6 +33,7 @@ from mjxgait.evolution.state import (
     decided,
     metrics,
 )
+from mjxgait.evolution.strategy import Normal, SeparableCma
 from mjxgait.evolution.variation import Variation
 from mjxgait.types import Evaluation, Tree
 
@@ -53,8 +55,9 @@ class Evolution:
         key, key_create = jax.random.split(key)
         count, window = self.config.population, self.config.forced.window
         integer = jnp.zeros((), jnp.int32)
+        genomes, follows = self.variation.begin(key_create, count), self.config.follows
         return EvolutionState(
-            genomes=self.variation.begin(key_create, count),
+            genomes=genomes,
             terms=jnp.zeros((count, trials, terms)),
             outcome=jnp.zeros((count, trials, outcomes)),
             fitness=jnp.full(count, -jnp.inf, jnp.float32),
@@ -72,7 +75,8 @@ class Evolution:
             spell_best=jnp.float32(-jnp.inf),
             barren=integer,
             rounds=jnp.ones(count) if self.config.remember else None,
-            family=jnp.arange(count) if self.config.family < 1 else None,
+            family=jnp.arange(count) if follows and self.config.family < 1 else None,
+            normal=self._strategy.begun(genomes) if self.config.search == "es" else None,
         )
 
     def propose(self, state: EvolutionState) -> Proposal:
@@ -147,11 +151,47 @@ class Evolution:
         )
         was_forced = state.forced
         state = dataclasses.replace(state, key=proposal.key, generation=generation)
+        normal = self._learnt(state, proposal, evaluation, seeding)
+        state = dataclasses.replace(state, normal=normal)
         state = decided(self.config, state)
         told = None
         if self.config.lineage and mothers is not None:
             told = jnp.where(seeding, NOBODY, mothers)
         return state, metrics(self.config, state, evaluation, was_forced, told)
+
+    @property
+    def _strategy(self) -> SeparableCma:
+        assert self.variation.box is not None, "refused before: see `make_spec`"
+        return SeparableCma(self.variation.box, self.config.sigma)
+
+    def _learnt(
+        self,
+        state: EvolutionState,
+        proposal: Proposal,
+        evaluation: Evaluation,
+        seeding: jax.Array,
+    ) -> Normal | None:
+        """Return what a strategy knows after this generation, whose state is given.
+
+        It begins around the best of the first generation. It learns from children, not from the
+        elite; where the old were evaluated instead of children it learns nothing.
+        """
+        if state.normal is None:
+            return None
+        children, terms, born = jax.tree.map(
+            lambda leaf: leaf[self.config.elites :],
+            (proposal.offspring, evaluation.terms, proposal.born),
+        )
+        now = jnp.maximum(state.generation, 0)
+        # Of children that ran in the first trial alone, the better goes first.
+        fitness, alone = (self._fitness(children, part, now) for part in (terms, terms[:, :1]))
+        learnt = self._strategy.learnt(state.normal, children, fitness, alone)
+        begun, fresh = self._strategy.begun(state.genomes), jnp.all(born == state.generation)
+
+        def pick(first: jax.Array, new: jax.Array, old: jax.Array) -> jax.Array:
+            return jnp.where(seeding, first, jnp.where(fresh, new, old))
+
+        return jax.tree.map(pick, begun, learnt, state.normal)
 
     def _recalled(
         self, state: EvolutionState, evaluation: Evaluation
@@ -214,6 +254,9 @@ class Evolution:
     ) -> tuple[object, jax.Array, jax.Array | None]:
         """Return genomes, origins and mothers' places; no places in sequential breeding."""
         config, count = self.config, self.config.offspring
+        if state.normal is not None:
+            drawn = self._strategy.draw(key, state.normal, count)
+            return drawn, jnp.full(count, int(Origin.DRAWN)), None
         if config.pool == "growing" or config.unique_children:
             bred, of_two = Nursery(config, self.variation).children(key, state.genomes)
             origin = jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION))

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.evolution.strategy import Normal
 from mjxgait.evolution.variation import first_occurrence
 from mjxgait.types import Evaluation, pytree
 
@@ -22,6 +23,7 @@ class Origin(IntEnum):
     CROSSOVER = 1
     MUTATION = 2
     NEWCOMER = 3
+    DRAWN = 4
 
 
 @pytree
@@ -42,6 +44,7 @@ class EvolutionState:
     stale: [] whether they have since `terms` were evaluated; None likewise.
     family: [P] first-generation ancestor along the mothers; None where a lineage may be of any
     size.
+    normal: what an evolution strategy has learnt; None for the genetic algorithm.
     """
 
     genomes: Any
@@ -65,6 +68,7 @@ class EvolutionState:
     level: jax.Array | None = None
     stale: jax.Array | None = None
     family: jax.Array | None = None
+    normal: Normal | None = None
 
 
 @pytree
@@ -221,6 +225,8 @@ def decided(whole: EvolutionConfig, state: EvolutionState) -> EvolutionState:
     quiet = jnp.where(state.forced | (state.generation <= 0), 0, state.quiet + 1)
     stalled = (quiet >= config.window) & ~_grown(bests, config.gain) & ~_grown(means, config.gain)
     begins = stalled & ~state.forced & config.enabled
+    if state.normal is not None:  # an evolution strategy has no parents to mutate
+        begins = jnp.zeros((), bool)
     first = ~jnp.isfinite(state.spell_best)
     pays = first | _grown(jnp.stack([state.spell_best, best]), config.gain)
     return dataclasses.replace(

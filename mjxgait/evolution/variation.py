@@ -38,6 +38,7 @@ class Variation(Generic[Genome]):
     genome -> genome. price: genomes [N, ...] -> [N], subtracted from the fitness; None: free.
     long: whether they loop along a genome place by place, which justifies some compile time.
     first: genomes [G, ...] that take the first places of the first generation; None: all are drawn.
+    box: bounds of genomes of bounded reals; None: the genomes are of another kind.
     """
 
     create: Callable[[jax.Array, int], Genome]
@@ -46,6 +47,7 @@ class Variation(Generic[Genome]):
     price: Callable[[Genome], jax.Array] | None = None
     long: bool = False
     first: Genome | None = None
+    box: Box | None = None
 
     def begin(self, key: jax.Array, count: int) -> Genome:
         """Return genomes [count, ...] of the first generation: `first`, the rest created."""
@@ -84,7 +86,7 @@ def real_variation(box: Box, config: EvolutionConfig) -> Variation:
         return _leafwise(key, moved, genome, box.low, box.high)
 
     middle = narrowed(box, config.initial_spread)
-    return Variation(create=creation(middle, config), cross=cross, mutate=mutate)
+    return Variation(create=creation(middle, config), cross=cross, mutate=mutate, box=box)
 
 
 def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Tree) -> Tree:

@@ -24,6 +24,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends, GivenBody, given_body, given_ends
 from mjxgait.creature.proportions import Proportions, extreme_bodies, proportions
 from mjxgait.creature.settings import Termination
+from mjxgait.errors import UserError
 from mjxgait.kinds import in_water
 from mjxgait.physics import make_plant
 from mjxgait.physics.batched_trees.plant import TreePlant
@@ -278,9 +279,25 @@ def make_spec(creature: Creature, config: Config) -> SimulatorSpec:
         not fit.
     """
     check_fit(creature, config)
-    if creature.settings.creature.grows:
-        return GrownSpec(creature, config)
-    return _of_model(creature, config)
+    grows = creature.settings.creature.grows
+    spec = GrownSpec(creature, config) if grows else _of_model(creature, config)
+    if config.evolution.search == "es":
+        _check_strategy(spec, config)
+    return spec
+
+
+def _check_strategy(spec: SimulatorSpec, config: Config) -> None:
+    """Refuse an evolution strategy for genomes that are no bounded reals.
+
+    Raises:
+      UserError: names the controller.
+    """
+    controller: Controller = spec.own.controller
+    if controller.variation(config.controller, config.evolution).box is None:
+        raise UserError(
+            'evolution.search = "es" is for genomes of bounded reals, and those of the controller '
+            f"{config.use.controller} are of another kind; take --search ga"
+        )
 
 
 def check_spec(creature: Creature, config: Config) -> None:

@@ -72,7 +72,7 @@ def pose_variation(box: Box, config: EvolutionConfig) -> "Variation[Genome]":
         )
         return dataclasses.replace(genome, key_poses=poses, tuning=tuning)
 
-    return Variation(create=creation(middle, config), cross=cross, mutate=mutate)
+    return Variation(create=creation(middle, config), cross=cross, mutate=mutate, box=box)
 
 
 def permuted_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.Array:
