@@ -25,7 +25,9 @@ def viewpoint(loop: WalkLoop, usual: float) -> tuple[np.ndarray, float]:
     the middle of the motion, where some part would leave the picture in one of the page's views.
     """
     creature, reach = loop.walk.creature, _Reach(loop)
-    target = np.array([0.0, 0.6 * creature.frame.stand_pos[2], 0.0])
+    # A loop in water is about the origin.
+    high = 0.0 if loop.walk.afloat else 0.6 * creature.frame.stand_pos[2]
+    target = np.array([0.0, high, 0.0])
     far = usual * float(creature.model.stat.extent)
     if _distance(reach, target) <= far:
         return target, far
