@@ -70,7 +70,7 @@ def gallery_command(arguments: Sequence[str]) -> int:
     else:
         if folders:
             raise UserError("gallery: name runs, or evolve them with --task; not both")
-        study = options.study or Path("runs") / f"gallery-{options.task}"
+        study = options.study or Path("runs") / f"gallery-{options.task.rpartition(':')[2]}"
         folders, out = (study,), options.out or study / PAGE
     assert out is not None
     from mjxgait.api.galleries import check_files, gallery
@@ -107,7 +107,7 @@ def _evolve(options: GalleryOptions, study: Path) -> int:
         return train_command(["--resume", str(study), *quiet])
     given = {
         "env": options.env or _usual_creature(options.task or ""),
-        "task": options.task,
+        "use.task": options.task,
         "runs": options.runs or RUNS,
         "out": study,
         "seed": options.seed,

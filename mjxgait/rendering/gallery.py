@@ -107,8 +107,8 @@ class Sheet:
     def __init__(self, shown: Sequence[Entry], title: str, seconds: float) -> None:
         self.shown, self.title = shown, title
         self.stages = [Stage([_beginning(one.walk, seconds)], *TILE) for one in shown]
-        self.columns = min(len(shown), MOST_COLUMNS)
-        rows = -(-len(shown) // self.columns)
+        rows = -(-len(shown) // MOST_COLUMNS)
+        self.columns = -(-len(shown) // rows)
         width, height = TILE[0] + EDGE, TILE[1] + STRIP + EDGE
         self.size = self.columns * width + EDGE, HEAD + rows * height
 

@@ -35,7 +35,7 @@ def build_gallery(shown: Sequence[Entry], title: str) -> str:
     return string.Template((web / "gallery.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
         style=style(),
-        lead=html.escape(f"{certified} of {len(shown)} certified. They {tally(shown)}."),
+        lead=html.escape(f"{certified} of {len(shown)} certified. By strategy: {tally(shown)}."),
         facts=json.dumps({"scenes": scenes}).replace("<", "\\u003c"),
         table=_table(shown),
         viewer=viewer_script(),

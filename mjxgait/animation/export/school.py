@@ -28,10 +28,8 @@ from mjxgait.rendering.walk import poses_of
 
 AIR = 0.3
 """Free space about a body, in units of its mean size."""
-WIDE = 1.6
-"""Width of the whole school over its height, about."""
-MARKS = 14
-"""Number of marks about each member."""
+MARKS, SPECK = 16, 0.024
+"""Number of marks about each member, and their radius over the least half size of its space."""
 FIELD = np.radians(30.0)
 """Vertical angle of view."""
 ASPECT = 1.6
@@ -93,7 +91,7 @@ def build_school(loops: Sequence[WalkLoop], water: bool) -> School:
             add_lamp(document, buffer, f"lamp_{number}", 0.12 * float(half.min()))
         marks = places_of_marks(MARKS, half, number, water)
         names = [f"mark_{number}_{mark}" for mark in range(MARKS)]
-        add_marks(document, buffer, names, 0.035 * float(half.min()), water)
+        add_marks(document, buffer, names, SPECK * float(half.min()), water)
         way = float(np.hypot(loop.advance, loop.climb)) if water else loop.advance
         seconds = float(loop.times[-1])
         tracks.append(Track(bodies, parts, lamp, marks, way, half, middles[number], seconds))
@@ -113,22 +111,29 @@ def places(sizes: np.ndarray, water: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return the middles [N, 3] m of the members' boxes in lines, and the half sizes [N, 3] m.
 
     sizes: [N, 3] m. Lines lead along Z; in water each is below the one before, on land nearer to
-    the camera, which stands at -X.
+    the camera, which stands at -X. There are as many as fill the picture best.
     """
+    orbit = WATER_VIEW if water else LAND_VIEW
+
+    def far(layout: tuple[np.ndarray, np.ndarray]) -> float:
+        middles, halves = layout
+        target = ((middles - halves).min(0) + (middles + halves).max(0)) / 2
+        return distance(middles, halves, target, orbit)
+
+    return min((_lines(sizes, n, water) for n in range(1, len(sizes) + 1)), key=far)
+
+
+def _lines(sizes: np.ndarray, columns: int, water: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes in lines of so many columns; see `places`."""
     boxes = sizes + AIR * sizes.mean()
     across = 1 if water else 0
-    mean = boxes.mean(0)
-    columns = int(
-        np.clip(np.round(np.sqrt(WIDE * len(boxes) * mean[across] / mean[2])), 1, len(boxes))
-    )
-    lines = np.arange(len(boxes)) // columns
-    places_in = np.arange(len(boxes)) % columns
-    wide = np.array([boxes[places_in == c, 2].max() for c in range(columns)])
-    deep = np.array([boxes[lines == r, across].max() for r in range(lines.max() + 1)])
+    line, column = np.divmod(np.arange(len(boxes)), columns)
+    wide = np.array([boxes[column == c, 2].max() for c in range(columns)])
+    deep = np.array([boxes[line == r, across].max() for r in range(line.max() + 1)])
     middles, halves = np.zeros_like(boxes), boxes / 2
-    middles[:, 2] = (np.cumsum(wide) - wide / 2)[places_in]
-    middles[:, across] = -(np.cumsum(deep) - deep / 2)[lines]
-    halves[:, 2], halves[:, across] = wide[places_in] / 2, deep[lines] / 2
+    middles[:, 2] = (np.cumsum(wide) - wide / 2)[column]
+    middles[:, across] = -(np.cumsum(deep) - deep / 2)[line]
+    halves[:, 2], halves[:, across] = wide[column] / 2, deep[line] / 2
     if not water:
         middles[:, 1] = sizes[:, 1] / 2
     return middles, halves

@@ -128,13 +128,19 @@ export class School {
     if (!this.members.length) return;
     for (const member of this.members) {
       member.draw(seconds);
-      const below = this.facts.water ? -member.half[1] : -member.middle[1];
-      const [x, y] = this.pixel(member, this.facts.water ? 0 : -member.half[0], below);
+      const [x, y] = this.foot(member);
       member.label.style.transform = `translate(${x}px, ${y}px) translate(-50%, -110%)`;
     }
     if (this.shown) this.placeCard(this.shown);
     if (!this.facts.water) this.scene.shadow.needsUpdate = true;
     this.scene.queueRender();
+  }
+
+  // Pixels [2] of the middle of a member's lower edge.
+  foot(member) {
+    return this.facts.water
+      ? this.pixel(member, 0, -member.half[1])
+      : this.pixel(member, -member.half[0], -member.middle[1]);
   }
 
   // Pixels [2] of a member's middle, or of a place beside it.
@@ -193,12 +199,13 @@ export class School {
     this.placeCard(member);
   }
 
+  // Below the member, where it hides none of it.
   placeCard(member) {
-    const [x, y] = this.pixel(member),
+    const [x, y] = this.foot(member),
       { offsetWidth, offsetHeight } = this.card,
       { clientWidth, clientHeight } = this.viewer;
-    const left = Math.max(Math.min(x + 16, clientWidth - offsetWidth - 8), 8),
-      top = Math.max(Math.min(y + 16, clientHeight - offsetHeight - 8), 8);
+    const left = Math.max(Math.min(x - offsetWidth / 2, clientWidth - offsetWidth - 8), 8),
+      top = Math.max(Math.min(y, clientHeight - offsetHeight - 8), 8);
     this.card.style.transform = `translate(${left}px, ${top}px)`;
   }
 
