@@ -6,6 +6,7 @@ The browser test needs Chromium (apt: chromium) and the Python package playwrigh
 import base64
 import json
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -16,7 +17,10 @@ from rendering.made_up import treading, write_run
 from web.browser import wait_until, watched_tab
 
 import mjxgait
+from mjxgait.config.tables import dump_toml
 from mjxgait.errors import UserError
+from mjxgait.experiments.multi_seed import ZOO, Seeds
+from mjxgait.files import write_text
 from mjxgait.rendering.gallery import Entry, by_strategy
 from mjxgait.training.folder import CHAMPION
 from mjxgait.web.gallery import build_gallery
@@ -151,3 +155,18 @@ def test_more_than_a_page_holds_is_refused(runs, tmp_path, monkeypatch):
     with pytest.raises(UserError, match="at most 0"):
         mjxgait.gallery(runs / "seed0", tmp_path / "all.html")
     assert (runs / "seed0" / CHAMPION).is_file()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "has"), [("runs", 3, 2), ("seed", 7, 0), ("task", "hop", "walk")]
+)
+def test_runs_that_are_there_are_not_made_again_otherwise(
+    option, value, has, runs, tmp_path, capsys
+):
+    study = tmp_path / "study"
+    shutil.copytree(runs, study)
+    write_text(study / ZOO, dump_toml(Seeds((0, 1))))
+    given = {"task": "walk", "study": study, option: value}
+    words = [word for name, one in given.items() for word in (f"--{name}", one)]
+    said = said_by(capsys, "gallery", *words, code=2)
+    assert f"holds runs with --{option} {has}; leave --{option} {value} out" in said
