@@ -9,7 +9,7 @@ from rendering.grown import grown_walk, straight
 
 from mjxgait.animation.export import build_glb, walk_loop
 from mjxgait.animation.export.recurrence import most_alike
-from mjxgait.animation.export.scenery import lamp_track
+from mjxgait.animation.export.scenery import lamp_track, life
 from mjxgait.animation.export.school import build_school, distance, places
 from mjxgait.animation.export.skeleton import gltf_axes
 
@@ -125,22 +125,38 @@ def test_a_lamp_stands_where_the_light_is(swimmer, walker):
     assert lamp_track(walker, np.eye(3), half) is None
 
 
+@pytest.mark.parametrize("begin", [0.1, 0.5, 0.85])
+def test_a_mark_lives_once_around(begin: float):
+    times, age = life(begin, 2.0)
+    assert (np.diff(times) > 0).all()
+    assert times[[0, -1]].tolist() == [0.0, 2.0]
+    assert age[0] == pytest.approx(age[-1])
+    (born,) = np.flatnonzero(np.diff(age) < 0) + 1
+    assert times[born] == pytest.approx(2.0 * begin)
+    assert age[born] == 0.0
+    assert age[born - 1] == pytest.approx(1.0, abs=1e-3)
+    # It is full grown and begins to vanish at keys.
+    assert [np.abs(age - share).min() for share in (0.2, 0.8)] == pytest.approx([0.0, 0.0])
+
+
 @pytest.mark.parametrize("water", [True, False])
-def test_marks_pass_a_body_in_place_without_a_seam(swimmer, walker, water: bool):
+def test_marks_stand_still_in_the_world(swimmer, walker, water: bool):
     loop = swimmer if water else walker
     document = gltf.GLTF2.load_from_bytes(build_glb(loop, floor=True))
-    (number,) = [n for n, node in enumerate(document.nodes) if node.name == "marks"]
-    (animation,) = document.animations
-    (channel,) = [c for c in animation.channels if c.target.node == number]
-    passed = np.array([0.0, loop.climb, loop.advance])
-    track = read(document, animation.samplers[channel.sampler].output)
-    np.testing.assert_allclose(track, [[0, 0, 0], -passed], atol=1e-6)
-    (shape,) = document.meshes[document.nodes[number].mesh].primitives
-    cloud = read(document, shape.attributes.POSITION).astype(float)
-    cloud = {tuple(np.round(point, 3)) for point in cloud}
-    moved = [point for point in cloud if tuple(np.round(np.array(point) + passed, 3)) in cloud]
-    # All but the foremost copy have one ahead of them, but for rounding.
-    assert len(moved) > 0.5 * len(cloud)
     names = [node.name for node in document.nodes]
+    (animation,) = document.animations
+    node = names.index("mark_3")
+    channels = {c.target.path: c for c in animation.channels if c.target.node == node}
+    sampler = animation.samplers[channels["translation"].sampler]
+    times, track = (read(document, number) for number in (sampler.input, sampler.output))
+    speed = -np.diff(track, axis=0) / np.diff(times, axis=0)
+    lives = np.diff(times[:, 0]) > 0.01
+    passed = np.array([0.0, loop.climb, loop.advance]) / loop.times[-1]
+    np.testing.assert_allclose(speed[lives], np.tile(passed, (lives.sum(), 1)), atol=1e-3)
+    size = read(document, animation.samplers[channels["scale"].sampler].output)
+    # Nothing is seen of the jump to the beginning of the next life.
+    (jump,) = np.flatnonzero(~lives)
+    assert size[[jump, jump + 1]].max() < 0.01
+    assert size.max() == 1.0
     assert ("lamp" in names) == water
     assert "floor" not in names

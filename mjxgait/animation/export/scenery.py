@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
-from mjxgait.animation.export.gltf import Buffer, add_channel, add_floor
+from mjxgait.animation.export.gltf import JUMP, Buffer, add_channel, add_floor
 from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.shaped import material_of, shaped
 from mjxgait.animation.export.skeleton import gltf_axes
@@ -26,8 +26,8 @@ GLOW = 2.6
 """Radius of the glow over that of the lamp."""
 ROOM = np.array([1.2, 0.9, 2.2])
 """Half sizes of the space with marks about one body, in body lengths: aside, up, ahead."""
-PASSING, SCATTERED = 90, 0.25
-"""Number of marks in it, and least way of a loop in body lengths for marks to pass."""
+PASSING, FADE, LEAST = 70, 0.2, 1e-3
+"""Number of marks in it, share of a mark's life in which it grows and vanishes, and least size."""
 MARK, LAMP = 0.012, 0.07
 """Radius of a mark and of a lamp in body lengths."""
 
@@ -42,8 +42,7 @@ def add_scenery(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop) -> None:
         add_floor(document, buffer, loop)
         return
     length = float(walk.creature.model.stat.extent)
-    times = buffer.add(loop.times[[0, -1]].astype(np.float32), bounds=True)
-    _add_passing(document, buffer, loop, length, times)
+    _add_passing(document, buffer, loop, length)
     lamp = lamp_track(loop, gltf_axes(walk.forward), np.array([0.6, 0.5, 0.9]) * length)
     if lamp is not None:
         node = add_lamp(document, buffer, "lamp", LAMP * length)
@@ -52,39 +51,38 @@ def add_scenery(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop) -> None:
         add_channel(buffer, document.animations[0], every, node, "translation", lamp)
 
 
-def _add_passing(
-    document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop, length: float, times: int
-) -> None:
-    """Add marks that pass once around with the loop: each takes the place of the one before.
+def _add_passing(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop, length: float) -> None:
+    """Add marks that a body passes: each grows, stays where it is in the world, and vanishes.
 
-    times: number of the accessor with the first and the last time.
+    Each lives as long as the loop, and its life begins at a moment of its own, so there is neither
+    a seam nor a pattern.
     """
     water = loop.walk.afloat
+    names = [f"mark_{number}" for number in range(PASSING)]
+    first = len(document.nodes)
+    add_marks(document, buffer, names, MARK * length, water)
+    document.scenes[0].nodes += range(first, first + PASSING)
+    places = places_of_marks(PASSING, ROOM * length, 0, water)
+    begins = np.random.default_rng(1).uniform(0.1, 0.9, PASSING)
     passed = np.array([0.0, loop.climb, loop.advance])
-    way = float(np.linalg.norm(passed))
-    half, moves = ROOM * length, way > SCATTERED * length
-    copies = int(np.ceil(half[2] / way)) if moves else 0
-    count = max(PASSING // (2 * copies + 1), 1)
-    # One copy fills the space that a loop passes.
-    box = np.array([half[0], half[1], way / 2 if moves else half[2]])
-    places = places_of_marks(count, box, 0, water)
-    ahead = passed / way if moves else np.array([0.0, 0.0, 1.0])
-    up = np.cross(ahead, [1.0, 0.0, 0.0])
-    places = places @ np.stack([[1.0, 0.0, 0.0], up, ahead])
-    shifts = np.arange(-copies, copies + 1)[:, None, None] * passed
-    points, normals, faces = mark_surface(MARK * length, water)
-    centres = (places + shifts).reshape(-1, 1, 3)
-    numbers = len(points) * np.arange(len(centres))[:, None, None]
-    surface = (
-        (centres + points).reshape(-1, 3),
-        np.tile(normals, (len(centres), 1)),
-        (numbers + faces).reshape(-1, 3),
-    )
-    node = _add(document, buffer, "marks", surface, mark_colour(water), glows=water)
-    document.scenes[0].nodes.append(node)
-    if moves:
-        track = np.array([[0.0, 0.0, 0.0], -passed])
-        add_channel(buffer, document.animations[0], times, node, "translation", track)
+    for node, (place, begin) in enumerate(zip(places, begins, strict=True), first):
+        times, age = life(begin, float(loop.times[-1]))
+        keys = buffer.add(times.astype(np.float32), bounds=True)
+        track = place + (0.5 - age)[:, None] * passed
+        size = np.clip(np.minimum(age, 1 - age) / FADE, LEAST, 1.0)[:, None] * np.ones(3)
+        for path, values in (("translation", track), ("scale", size)):
+            add_channel(buffer, document.animations[0], keys, node, path, values)
+
+
+def life(begin: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return key times [6] in s and a mark's age there, 0 to 1; it begins at a share of the loop."""
+    turns = np.sort((begin + np.array([FADE, 1 - FADE])) % 1.0)
+    times = seconds * np.sort([0.0, *turns, begin, 1.0])
+    at = int(np.searchsorted(times, seconds * begin))
+    times = np.insert(times, at, times[at] - JUMP)
+    age = (times / seconds - begin) % 1.0
+    age[at + 1] = 0.0
+    return times, age
 
 
 def mark_surface(radius: float, water: bool) -> Surface:

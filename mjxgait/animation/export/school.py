@@ -30,6 +30,8 @@ AIR = 0.3
 """Free space about a body, in units of its mean size."""
 MARKS, SPECK = 16, 0.024
 """Number of marks about each member, and their radius over the least half size of its space."""
+SAND = 6.0
+"""Radius of the sand over the size of the school."""
 FIELD = np.radians(30.0)
 """Vertical angle of view."""
 ASPECT = 1.6
@@ -97,7 +99,9 @@ def build_school(loops: Sequence[WalkLoop], water: bool) -> School:
         tracks.append(Track(bodies, parts, lamp, marks, way, half, middles[number], seconds))
     low, high = (middles - halves).min(0), (middles + halves).max(0)
     if not water:
-        add_sand(document, buffer, (low + high) / 2, 3 * float(np.ptp([low, high], axis=0).max()))
+        add_sand(
+            document, buffer, (low + high) / 2, SAND * float(np.ptp([low, high], axis=0).max())
+        )
     inner = {child for node in document.nodes for child in node.children or []}
     document.scenes[0].nodes = [n for n in range(len(document.nodes)) if n not in inner]
     buffer.close()
