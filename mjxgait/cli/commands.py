@@ -31,8 +31,8 @@ COMMANDS = {
     "export": Command("write a walk as an animation file", "mjxgait export RUN --out walk.glb"),
     "share": Command("write one offline page of a walk in 3D", "mjxgait share RUN --out walk.html"),
     "gallery": Command(
-        "put several champions on one page, by how they move",
-        "mjxgait gallery RUN RUN --out gallery.html",
+        "show champions side by side on one page",
+        "mjxgait gallery RUNS --out all.html",
     ),
     "repertoire": Command(
         "evolve a grid of walks that blend, for games", "mjxgait repertoire duck", creature=True
