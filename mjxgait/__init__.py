@@ -11,6 +11,7 @@ Give it a body and it returns a walk that holds up in physics, tested in a secon
 
     run = mjxgait.train("duck", quiet=True, on_generation=lambda line: print(line["best"]))
     mjxgait.render(run, "walk.webp")      # also export, share, plot; `run` alone in a notebook
+    mjxgait.gallery(["runs/x", "runs/y"], "all.html")    # several champions on one page
     mjxgait.repertoire("duck"); mjxgait.ablate("forced_evolution")   # many runs
     mjxgait.walk(run)                     # columns for pandas: joints, feet, trunk over time
     mjxgait.examine(run)                  # the certificate again, criterion by criterion
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
         examine,
         export,
         frames,
+        gallery,
         import_model,
         load_creature,
         open,
@@ -57,6 +59,7 @@ __all__ = [
     "examine",
     "export",
     "frames",
+    "gallery",
     "import_model",
     "load_creature",
     "open",

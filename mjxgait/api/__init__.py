@@ -12,6 +12,7 @@ from mjxgait.api.environments import environment
 from mjxgait.api.examining import certify, examine, examine_expressions, verify, walk
 from mjxgait.api.exports import export, plot, share
 from mjxgait.api.films import render
+from mjxgait.api.galleries import gallery
 from mjxgait.api.make import load_creature, refine, train
 from mjxgait.api.repertoires import repertoire
 from mjxgait.api.run import Run, frames, open
@@ -28,6 +29,7 @@ __all__ = [
     "examine_expressions",
     "export",
     "frames",
+    "gallery",
     "import_model",
     "load_creature",
     "open",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from mjxgait.api.run import Place
+from mjxgait.champion import Champion, read_champion
 from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Physics
 from mjxgait.config.tables import (
@@ -203,6 +204,25 @@ def finished(planned: Prepared, options: AblateRequest, output: Output) -> Path 
     output.console.print(report.read_text(encoding="utf-8"))
     output.console.print(f"report        {report}, {report.with_suffix('.html')}")
     return report
+
+
+def champions_of_study(folder: Path) -> list[tuple[str, Creature, Champion]]:
+    """Return the champions that a study keeps so far: a name, the creature given, and the genome.
+
+    Raises:
+      UserError: not the folder of a study, or a damaged file.
+    """
+    from mjxgait.experiments.ablation.plan import make_plan
+    from mjxgait.experiments.ablation.rows import champion_path
+
+    study, creature = _open(folder)
+    plan = make_plan(study, creature, str(folder / STUDY))
+    files = {f"{run.variant} seed{run.seed}": champion_path(folder, plan, run) for run in plan.runs}
+    return [
+        (name, creature, read_champion(file, creature))
+        for name, file in files.items()
+        if file.is_file()
+    ]
 
 
 def _read(options: AblateRequest) -> tuple["Study", Creature]:

@@ -30,6 +30,10 @@ COMMANDS = {
     "render": Command("make a video of a walk or a race", "mjxgait render RUN --out walk.webp"),
     "export": Command("write a walk as an animation file", "mjxgait export RUN --out walk.glb"),
     "share": Command("write one offline page of a walk in 3D", "mjxgait share RUN --out walk.html"),
+    "gallery": Command(
+        "show champions side by side on one page",
+        "mjxgait gallery RUNS --out all.html",
+    ),
     "repertoire": Command(
         "evolve a grid of walks that blend, for games", "mjxgait repertoire duck", creature=True
     ),

@@ -47,7 +47,7 @@ def _with_own_parts(given: Sequence[str]) -> list[str]:
     rest, named = take_own(rest)
     if command == "train":
         rest += [word for kind, name in named.items() for word in (f"--use.{kind}", name)]
-    if command == "certify" and "task" in named:
+    if command in ("certify", "gallery") and "task" in named:
         rest += ["--task", named["task"]]
     return rest
 

@@ -23,6 +23,8 @@ from mjxgait.web.certificate import certificate_summary, certificate_table, tabl
 RATE = 30
 FARTHEST = 3.0
 """Largest distance to which a reader can move the camera, in units of the first."""
+SHADOW = 0.9
+"""Darkness of the shadow."""
 FAR = 1.7
 """Camera distance in units of the creature's size, or farther where a loop needs more room."""
 
@@ -69,16 +71,12 @@ def build_page(walk: Walk, loop: WalkLoop, verdict: str, sections: str) -> str:
     """Return the text of the page. verdict, sections: HTML above and below the walk."""
     web = resources.files("mjxgait.web") / "assets"
     target, far = viewpoint(loop, FAR)
-    stride = loop.times[-1] / loop.strides
-    lead = (
-        f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.frame.body_length:.2f} body lengths per "
-        f"second; a stride takes {stride:.2f} s and leads {loop.advance / loop.strides:.2f} m "
-        "forward."
-    )
     return string.Template((web / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(walk.creature.name.replace("_", " ")),
         style=style(),
-        lead=html.escape(lead),
+        lead=html.escape(_lead(walk, loop)),
+        around="water" if walk.afloat else "sand" if walk.grown else "",
+        shadow=0.0 if walk.afloat else SHADOW,
         verdict=verdict,
         file=html.escape(f"{walk.creature.name}.glb"),
         glb=base64.b64encode(build_glb(loop, floor=True)).decode("ascii"),
@@ -88,6 +86,21 @@ def build_page(walk: Walk, loop: WalkLoop, verdict: str, sections: str) -> str:
         frames=len(loop.times) - 1,
         viewer=viewer_script(),
         sections=sections,
+    )
+
+
+def _lead(walk: Walk, loop: WalkLoop) -> str:
+    """The motion in numbers."""
+    seconds = loop.times[-1] / loop.strides
+    if walk.grown:
+        return (
+            f"{loop.speed:.2f} m/s. The page repeats the {seconds:.1f} s after which the creature is "
+            "most like it was."
+        )
+    return (
+        f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.frame.body_length:.2f} body lengths per "
+        f"second; a stride takes {seconds:.2f} s and leads {loop.advance / loop.strides:.2f} m "
+        "forward."
     )
 
 

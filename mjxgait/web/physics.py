@@ -58,7 +58,7 @@ def build_physics_page(creature: Creature, facts: Facts, engine: Engine, said: s
     glb, apart = build_bodies(creature)
     speed = CertificateConfig().pushes.speed * PUSH
     page = {
-        "bodies": shown_bodies(creature),
+        "bodies": shown_bodies(creature.model),
         "apart": apart,
         "extent": extent,
         "push": speed * (creature.gravity * creature.frame.hip_height) ** 0.5,

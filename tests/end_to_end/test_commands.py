@@ -61,6 +61,16 @@ def gathered(folder: Path) -> tuple[list[str], str]:
     return given, "set/map.png"
 
 
+def shown(folder: Path) -> tuple[list[str], str]:
+    given = [str(walker(folder / "run")), "--out", "all.html", "--poster", "all.png"]
+    return given, "all.html"
+
+
+def evolved_and_shown(folder: Path) -> tuple[list[str], str]:
+    given = ["--task", "walk", "--env", str(STOOL), "--runs", "2", "--study", "set"]
+    return [*given, "--generations", "1", "--population", "4"], "set/gallery.html"
+
+
 def ranked(folder: Path) -> tuple[list[str], str]:
     run = faller(folder / "run")
     certify(run)
@@ -79,6 +89,7 @@ FORMS: dict[str, list[Made]] = {
     ],
     "export": [of_run("--out", f"walk.{kind}", writes=f"walk.{kind}") for kind in ("glb", "bvh")],
     "share": [of_run("--out", "walk.html", writes="walk.html"), simulated],
+    "gallery": [shown, evolved_and_shown],
     "repertoire": [gathered],
     "import": [
         lambda folder: ([str(STOOL / "creature.xml"), "--out", "mine"], "mine/creature.toml")

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
-from mjxgait.animation.export.glb import material_of, shaped
 from mjxgait.animation.export.gltf import Buffer, add_tiles
+from mjxgait.animation.export.shaped import material_of, shaped
 from mjxgait.animation.export.skeleton import gltf_axes, quaternions
 from mjxgait.animation.export.surface import Surface, geom_surface
 from mjxgait.creature import Creature
@@ -17,9 +17,8 @@ from mjxgait.reference.layout import start_frame
 from mjxgait.rendering.painter import geom_colours, seen_geoms
 
 
-def shown_bodies(creature: Creature) -> list[int]:
+def shown_bodies(model: mujoco.MjModel) -> list[int]:
     """Return the numbers of the moving bodies that have a visible surface."""
-    model = creature.model
     return sorted({int(model.geom_bodyid[g]) for g in seen_geoms(model)} - {0})
 
 
@@ -29,7 +28,7 @@ def build_bodies(creature: Creature) -> tuple[bytes, float]:
     document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
     document.scenes, document.scene = [gltf.Scene(name=creature.name, nodes=[0])], 0
     buffer = Buffer(document)
-    bodies = shown_bodies(creature)
+    bodies = shown_bodies(model)
     axes = gltf_axes(start_frame(creature).forward[:2])
     turn = quaternions(axes[None])[0].tolist()
     first = 2
@@ -42,7 +41,7 @@ def build_bodies(creature: Creature) -> tuple[bytes, float]:
     mujoco.mj_kinematics(model, data)
     for body in bodies:
         place, about = data.xpos[body].tolist(), np.roll(data.xquat[body], -1).tolist()
-        mesh = _mesh(document, buffer, model, body)
+        mesh = body_mesh(document, buffer, model, body)
         document.nodes.append(
             gltf.Node(name=f"body_{body}", mesh=mesh, translation=place, rotation=about)
         )
@@ -53,8 +52,8 @@ def build_bodies(creature: Creature) -> tuple[bytes, float]:
     return b"".join(document.save_to_bytes()), apart
 
 
-def _mesh(document: gltf.GLTF2, buffer: Buffer, model: mujoco.MjModel, body: int) -> int:
-    """Number of a new mesh of a body's visible geoms."""
+def body_mesh(document: gltf.GLTF2, buffer: Buffer, model: mujoco.MjModel, body: int) -> int:
+    """Return the number of a new mesh of a body's visible geoms."""
     colours, primitives = geom_colours(model), []
     for geom in seen_geoms(model):
         if model.geom_bodyid[geom] != body:

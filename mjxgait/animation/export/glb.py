@@ -15,8 +15,10 @@ import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.clips.clip import NOTE
 from mjxgait.animation.export.footfalls import contacts
-from mjxgait.animation.export.gltf import Buffer, add_channel, add_floor, add_tiles, facts_of
+from mjxgait.animation.export.gltf import Buffer, add_channel, add_tiles, facts_of
 from mjxgait.animation.export.loop import WalkLoop
+from mjxgait.animation.export.scenery import add_scenery
+from mjxgait.animation.export.shaped import material_of, shaped
 from mjxgait.animation.export.skeleton import (
     STILL,
     Skeleton,
@@ -27,7 +29,7 @@ from mjxgait.animation.export.skeleton import (
     travel,
     world_poses,
 )
-from mjxgait.animation.export.surface import Piece, Surface, along_limbs, linear, pieces_of
+from mjxgait.animation.export.surface import Piece, along_limbs, pieces_of
 from mjxgait.champion.serializers import serializer_of
 from mjxgait.files import write_bytes, writing
 
@@ -63,9 +65,6 @@ def _stride(loop: WalkLoop, angles: np.ndarray) -> np.ndarray:
     return closed
 
 
-ROUGHNESS = 0.75
-
-
 def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
     """Write the loop; see `build_glb`.
 
@@ -82,11 +81,11 @@ def build_glb(
     """The bytes of the file.
 
     travelling: the root moves forward at an even speed; otherwise the creature walks in place.
-    floor: rungs pass below it. footfalls: the animation states when feet are down.
+    floor: what is around it passes; see `add_scenery`. footfalls: the animation states when feet are down.
     """
     document, buffer = _scene({"walk": loop}, travelling)
     if floor:
-        add_floor(document, buffer, loop)
+        add_scenery(document, buffer, loop)
     document.extras = facts_of(loop, travelling)
     if footfalls:
         feet = loop.walk.creature.feet.names
@@ -167,38 +166,6 @@ def _primitive(buffer: Buffer, piece: Piece, material: int) -> gltf.Primitive:
     primitive.attributes.JOINTS_0 = buffer.add(places, gltf.ARRAY_BUFFER)
     primitive.attributes.WEIGHTS_0 = buffer.add(weights, gltf.ARRAY_BUFFER, normalized=True)
     return primitive
-
-
-def shaped(buffer: Buffer, surface: Surface, material: int) -> gltf.Primitive:
-    """Store a surface. material: its number in the document."""
-    points, normals, faces = surface
-    indices = faces.astype(np.uint16 if len(points) < 0xFFFF else np.uint32)
-    return gltf.Primitive(
-        attributes=gltf.Attributes(
-            POSITION=buffer.add(points.astype(np.float32), gltf.ARRAY_BUFFER, bounds=True),
-            NORMAL=buffer.add(_unit(normals), gltf.ARRAY_BUFFER),
-        ),
-        indices=buffer.add(indices.reshape(-1), gltf.ELEMENT_ARRAY_BUFFER),
-        material=material,
-    )
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)
-
-
-def material_of(name: str, colour: np.ndarray) -> gltf.Material:
-    """Return a matt material. colour: sRGB and opacity, [4]."""
-    look = gltf.PbrMetallicRoughness(
-        baseColorFactor=[*map(float, linear(colour[:3])), float(colour[3])],
-        metallicFactor=0.0,
-        roughnessFactor=ROUGHNESS,
-    )
-    return gltf.Material(
-        name=name,
-        pbrMetallicRoughness=look,
-        alphaMode="BLEND" if colour[3] < 1 else "OPAQUE",
-    )
 
 
 def _add_skin(

@@ -8,9 +8,9 @@ import dataclasses
 import mujoco
 import numpy as np
 
+from mjxgait.animation.export.recurrence import most_alike
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.kinds import in_water
 from mjxgait.reference.measure import falls_of_feet
 from mjxgait.rendering.walk import Walk
 
@@ -29,7 +29,8 @@ class WalkLoop:
     walk adds it evenly. stretched: duration over the recorded one. frames: first and last recorded
     frame. turned: rad to the left in one loop, added likewise; in place the creature always looks
     ahead. path: [F, 2] m in the world, if the root moves unevenly; used in place, too. begins:
-    share of the recorded frames, from the first on, at which the key frames begin.
+    share of the recorded frames, from the first on, at which the key frames begin. climb: m up in
+    one loop, of a swimmer.
     """
 
     walk: Walk
@@ -42,6 +43,7 @@ class WalkLoop:
     turned: float = 0.0
     path: np.ndarray | None = None
     begins: float = 0.0
+    climb: float = 0.0
 
     @property
     def times(self) -> np.ndarray:
@@ -51,7 +53,8 @@ class WalkLoop:
     @property
     def speed(self) -> float:
         """Mean speed in m/s."""
-        return float(self.advance / self.times[-1])
+        ahead = np.hypot(self.advance, self.climb) if self.climb else self.advance
+        return float(ahead / self.times[-1])
 
 
 def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
@@ -62,12 +65,7 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
     Raises:
       UserError: the walk has no steady stride.
     """
-    chosen = _fitting_strides(walk, rate, most)
-    if chosen is None and in_water(walk.champion.task):
-        raise UserError(
-            f"{walk.creature.name}: a swimmer has no strides to make a loop of; `mjxgait render` "
-            "shows it"
-        )
+    chosen = _alike(walk, rate) if walk.grown else _fitting_strides(walk, rate, most)
     if chosen is None:
         why = (
             f"it fell after {walk.fell:.2f} s"
@@ -97,9 +95,13 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
     # mean height.
     below = walk.ground_heights(walk.qpos[first:last, place : place + 2])
     qpos[:, place + 2] -= below.mean() - 0.5 * (below[-1] - below[0])
-    qpos[:, place : place + 2] -= qpos[:-1, place : place + 2].mean(0)
+    climb = float(-gap[root + 2]) if walk.afloat else 0.0
+    level = 3 if walk.afloat else 2
+    qpos[:, place : place + level] -= qpos[:-1, place : place + level].mean(0)
     stretched, turned = count / rate / seconds, float(rate_of_turn * seconds)
-    return WalkLoop(walk, qpos, rate, strides, advance, stretched, (first, last), turned)
+    return WalkLoop(
+        walk, qpos, rate, strides, advance, stretched, (first, last), turned, climb=climb
+    )
 
 
 def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
@@ -163,6 +165,13 @@ def _fitting_strides(walk: Walk, rate: int, most: int) -> tuple[int, int, int, i
         if error < TOLERANCE:
             break
     return min(found)[1] if found else None
+
+
+def _alike(walk: Walk, rate: int) -> tuple[int, int, int, int] | None:
+    """The same of a body that grew, whose brain has no cycle: one time around."""
+    upright = walk.body_poses()[1][:, walk.creature.trunk].reshape(len(walk.qpos), 9)
+    found = most_alike(walk.qpos[:, walk.creature.root_qpos + 7 :], upright, walk.time_step)
+    return found and (*found, 1, max(round((found[1] - found[0]) * walk.time_step * rate), 2))
 
 
 def _between(model: mujoco.MjModel, qpos: np.ndarray, at: float) -> np.ndarray:

@@ -44,6 +44,19 @@ def geom_surface(model: mujoco.MjModel, geom: int) -> Surface:
             return _box(size)
 
 
+def ball(radius: float) -> Surface:
+    """The surface of a ball."""
+    return _ellipsoid(np.repeat(radius, 3))
+
+
+def disc(radius: float) -> Surface:
+    """A level disc that is seen from above."""
+    around = np.linspace(0, 2 * np.pi, 4 * AROUND, endpoint=False)
+    rim = radius * np.stack([np.sin(around), np.zeros(len(around)), np.cos(around)], 1)
+    fan = np.array([[0, i, i + 1] for i in range(1, len(around) - 1)])
+    return rim, np.tile([0.0, 1.0, 0.0], (len(rim), 1)), fan
+
+
 def far_end(model: mujoco.MjModel, body: int, qpos: np.ndarray) -> np.ndarray:
     """Vector [3] in m, in the world, from a body's origin to the mean of its farthest points."""
     data = mujoco.MjData(model)

@@ -14,6 +14,8 @@ FIELD = np.radians(30.0)
 """The viewer's vertical angle of view."""
 ASPECT = 1.5
 """Smallest width over height of the page's picture."""
+AROUND = 1.4
+"""The same for a body that grew: what is around it shows its motion."""
 AIR = 1.05
 """Distance of the camera over the smallest one."""
 
@@ -23,14 +25,17 @@ def viewpoint(loop: WalkLoop, usual: float) -> tuple[np.ndarray, float]:
 
     usual: distance in units of the creature's size. The camera stands farther away, and looks at
     the middle of the motion, where some part would leave the picture in one of the page's views.
+    A body that grew has no usual size, and fills the picture.
     """
     creature, reach = loop.walk.creature, _Reach(loop)
     target = np.array([0.0, 0.6 * creature.frame.stand_pos[2], 0.0])
     far = usual * float(creature.model.stat.extent)
-    if _distance(reach, target) <= far:
+    if not loop.walk.grown and _distance(reach, target) <= far:
         return target, far
     ends = reach.along(np.concatenate([np.eye(3), -np.eye(3)]))
     target = (ends[:3] - ends[3:]) / 2
+    if loop.walk.grown:
+        return target, AROUND * _distance(reach, target)
     return target, max(far, AIR * _distance(reach, target))
 
 
