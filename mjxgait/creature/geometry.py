@@ -1,5 +1,7 @@
 """Measurements of a MuJoCo model in its standing pose: support points, leg lengths, mirror map."""
 
+from collections.abc import Collection
+
 import mujoco
 import numpy as np
 
@@ -67,9 +69,18 @@ def lowest(model: mujoco.MjModel, data: mujoco.MjData) -> float:
     return min(-geom_reach(model, data, g, DOWN) for g in shapes(model))
 
 
-def body_length(model: mujoco.MjModel, data: mujoco.MjData, forward: np.ndarray) -> float:
-    """Distance from the foremost to the hindmost point along a world direction [3]; m."""
-    parts = [g for g in range(model.ngeom) if model.geom_bodyid[g] != 0]
+def body_length(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    forward: np.ndarray,
+    bodies: Collection[int] | None = None,
+) -> float:
+    """Distance from the foremost to the hindmost point along a world direction [3]; m.
+
+    bodies: whose shapes count; None is all.
+    """
+    counted = range(1, model.nbody) if bodies is None else bodies
+    parts = [g for g in range(model.ngeom) if model.geom_bodyid[g] in counted]
     front = max(geom_reach(model, data, g, forward) for g in parts)
     return front + max(geom_reach(model, data, g, -forward) for g in parts)
 

@@ -242,8 +242,12 @@ def _folder(
         )
     kinematics.pose(best.q)
     passing = planar and bool(geometry.parallel(kinematics.data.xaxis[1:]).all())
-    hip, length = _sizes(best)
+    is_rig = bool(bones)
+    hip, length = _sizes(best, is_rig)
     shorter = length < hip
+    if is_rig and not shorter:
+        why = "from the hindmost to the foremost leg: tails and necks do not count"
+        notes.guess("body_length", f"{length:.3g}", "medium", why)
     if shorter:
         # Speeds count in body lengths: a biped measured from its back to its toes would score well
         # for shuffling.
@@ -257,7 +261,7 @@ def _folder(
         best,
         mirror is not None,
         pairs,
-        length if shorter else None,
+        length if shorter or is_rig else None,
         passing,
         bones,
         train,
@@ -291,12 +295,17 @@ def _stated_pairs(
     }
 
 
-def _sizes(best: Candidate) -> tuple[float, float]:
-    """Hip height and body length in m in the standing pose."""
+def _sizes(best: Candidate, between_legs: bool) -> tuple[float, float]:
+    """Hip height and body length in m in the standing pose.
+
+    between_legs: whether only the trunk between the legs, and they, count.
+    """
     model, data = best.kinematics.model, mujoco.MjData(best.kinematics.model)
     data.qpos[:] = best.qpos
     mujoco.mj_kinematics(model, data)
-    length = geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
+    legs = {b for group in best.kinematics.feet for b in geometry.ancestors(model, group[0] + 1)}
+    counted = legs if between_legs else None
+    length = geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]), counted)
     return stance_of(best.kinematics, best.qpos[7:]).hip, length
 
 
