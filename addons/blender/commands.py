@@ -18,7 +18,7 @@ CHARACTER, CYCLE, CREATURE, RUN, WALK = "character.glb", "cycle.glb", "creature"
 RATES = (24, 30, 60)
 GAITS = (
     *("natural", "walk", "amble", "trot", "pace", "canter", "bound", "gallop", "hop"),
-    *("tripod", "wave", "waddle"),
+    *("tripod", "wave", "alternating", "waddle"),
 )
 STYLES = ("calm", "sneaky", "heavy", "proud", "tired", "hurried")
 

@@ -49,8 +49,8 @@ class TrainOptions(Verbosity):
       speed: Target speed: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
         This and --gait, --turn, --steer and --style are for walking (docs/guide/gaits.md).
       gait: On four feet walk, amble, trot, pace, canter, bound, gallop or hop; on six walk, tripod
-        or wave; on two walk, waddle or hop; natural is an animal's at this speed, auto whatever
-        evolves. By default that of [usual] in creature.toml, or else auto.
+        or wave; on eight alternating; on two walk, waddle or hop; natural is an animal's at this
+        speed, auto whatever evolves. By default that of [usual] in creature.toml, or else auto.
       turn: Turn rate while walking, degrees per second to the left.
       steer: Largest commanded turn rate that the walk must follow, degrees per second to either
         side.

@@ -61,6 +61,8 @@ def test_what_hangs_in_the_middle_is_no_foot(tmp_path: Path):
     creature = load_files(import_model(file, ImportChoices(apart=False)).files)
     feet = {name.removesuffix("_foot") for name in creature.feet.names}
     assert feet == {"LeftHand", "RightHand", "LeftHindPaw", "RightHindPaw"}
+    # Without the tail, which ends at -0.78 m, and the head, which ends at 0.48 m.
+    assert 0.44 < creature.frame.body_length < 0.75
 
 
 def test_a_bird_has_legs_beside_its_wings(tmp_path: Path):

@@ -124,6 +124,9 @@ GAITS: dict[int, dict[str, Gait]] = {
         "wave": Gait(_WAVES, ("wave",), (0.75, 1.0)),
         "tripod": Gait(((0.0, 0.5, 0.0, 0.5, 0.0, 0.5),), ("tripod",)),
     },
+    8: {
+        "alternating": Gait(((0.0, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5, 0.0),), ("alternating",)),
+    },
 }
 """Gaits by number of feet and name."""
 

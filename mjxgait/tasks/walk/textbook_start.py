@@ -43,7 +43,12 @@ def top_speed(creature: Creature, config: Config) -> float:
 def natural_gait(creature: Creature, speed: float) -> str:
     """Gait of an animal with as many feet at a speed in m/s; `auto` if it has no name."""
     froude = speed**2 / (creature.gravity * creature.frame.hip_height)
-    names = {2: "walk", 4: "walk" if froude < WALKS_UP_TO else "trot", 6: "tripod"}
+    names = {
+        2: "walk",
+        4: "walk" if froude < WALKS_UP_TO else "trot",
+        6: "tripod",
+        8: "alternating",
+    }
     return names.get(len(creature.feet.names), AUTO)
 
 
