@@ -94,6 +94,12 @@ def ancestors(model: mujoco.MjModel, body: int) -> list[int]:
     return chain
 
 
+def moving_body(model: mujoco.MjModel, body: int) -> int:
+    """The nearest body from `body` up with a joint; the topmost one if none has."""
+    chain = ancestors(model, body)
+    return next((b for b in chain if model.body_jntnum[b]), chain[-1] if chain else body)
+
+
 def subtree(model: mujoco.MjModel, body: int) -> list[int]:
     """The body and all bodies below it."""
     return [b for b in range(body, model.nbody) if body in ancestors(model, b)]

@@ -254,11 +254,17 @@ def _feet(
     nose = data.xmat[trunk].reshape(3, 3) @ axes[0] * [1, 1, 0]
     nose = nose / np.linalg.norm(nose)
     level = np.stack([nose, np.cross([0, 0, 1], nose)], 1)
-    own = [[g for g in stepping if model.geom_bodyid[g] == body] for body in bodies]
+    foot_of = [
+        bodies.index(geometry.moving_body(model, int(model.geom_bodyid[g]))) for g in stepping
+    ]
+    own = [
+        [g for g, foot in zip(stepping, foot_of, strict=True) if foot == n]
+        for n in range(len(bodies))
+    ]
     places = [(data.geom_xpos[geoms].mean(0) - data.xpos[trunk]) @ level for geoms in own]
     return Feet(
         names=tuple(model.body(b).name for b in bodies),
-        geoms=tuple(bodies.index(int(model.geom_bodyid[g])) for g in stepping),
+        geoms=tuple(foot_of),
         seen=(*stepping, *_forbidden(model, stepping, ground)),
         others=tuple(ground),
         stations=stations_of([(float(ahead), float(left)) for ahead, left in places]),
@@ -267,12 +273,16 @@ def _feet(
 
 
 def _foot_bodies(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[list[int], list[int]]:
-    """Foot bodies, and foot geoms in the order of their feet; geoms of one body form one foot."""
+    """Foot bodies, and foot geoms in the order of their feet.
+
+    Geoms of one body form one foot, also on parts that are fixed to it, such as toes.
+    """
     if not names:
         raise UserError("creature.feet is empty; name the geoms that step on the floor")
     geoms = [_id(model, mujoco.mjtObj.mjOBJ_GEOM, name, "creature.feet") for name in names]
-    bodies = list(dict.fromkeys(int(model.geom_bodyid[g]) for g in geoms))
-    return bodies, sorted(geoms, key=lambda g: bodies.index(int(model.geom_bodyid[g])))
+    body_of = {g: geometry.moving_body(model, int(model.geom_bodyid[g])) for g in geoms}
+    bodies = list(dict.fromkeys(body_of.values()))
+    return bodies, sorted(geoms, key=lambda g: bodies.index(body_of[g]))
 
 
 def _forbidden(model: mujoco.MjModel, feet: list[int], ground: list[int]) -> list[int]:

@@ -155,7 +155,8 @@ def _radius(plan: Plan, bone: int) -> float:
     length = max((float(np.linalg.norm(b - a)) for a, b in segments), default=0.0)
     if len(rig.skins[bone]) >= SKINNED and segments:
         away = np.min([_distances(rig.skins[bone], a, b) for a, b in segments], axis=0)
-        radius = min(float(np.median(away)), _round_radius(rig.skins[bone], *segments[0]))
+        form = narrow_radius if plan.in_middle(bone) else round_radius
+        radius = min(float(np.median(away)), form(rig.skins[bone], *segments[0]))
         return float(np.clip(radius, THIN * plan.height, 0.3 * plan.height))
     least = THIN * plan.height
     sideways = int(np.abs(plan.way(bone)).argmax()) == plan.side  # such as a collar bone
@@ -165,15 +166,28 @@ def _radius(plan: Plan, bone: int) -> float:
     return max(min(share * length, most * TRUNK * plan.half_width or np.inf), least)
 
 
-def _round_radius(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
-    """Radius in m of a round bar of the cross-section of points [V, 3] about a segment.
+def round_radius(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+    """Radius in m of a round bar with the area of the cross-section of points [V, 3].
 
     That of a wing or a fin, which is broad and flat, is far smaller than its points' distance.
     """
-    along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
+    return float(_half_widths(points, end - start).prod() ** 0.5)
+
+
+def narrow_radius(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+    """Radius in m of a round bar that is as wide as the cross-section where it is narrowest.
+
+    A chest is higher than wide; a rounder one would have the arms in it.
+    """
+    return float(_half_widths(points, end - start).min())
+
+
+def _half_widths(points: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Half axes [2] in m of the ellipse whose outline has the moments of points [V, 3]."""
     across = np.linalg.svd(along[None])[2][1:]
-    moments = np.linalg.eigvalsh(np.cov(across @ (points - a).T, bias=True))
-    return float(np.sqrt(2.0) * np.maximum(moments, 0.0).prod() ** 0.25)
+    moments = np.linalg.eigvalsh(np.cov(across @ points.T, bias=True))
+    widths: np.ndarray = np.sqrt(2.0 * np.maximum(moments, 0.0))
+    return widths
 
 
 def _distances(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

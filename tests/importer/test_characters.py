@@ -14,7 +14,7 @@ from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.creature.scale import load_files
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.rig import Plan, hinges_of
-from mjxgait.importer.rigged import _round_radius
+from mjxgait.importer.rigged import narrow_radius, round_radius
 
 LOW: dict[str, Bone] = {
     "Belly": ("Hips", (0, 45, -20), None),
@@ -82,8 +82,9 @@ def test_a_wing_weighs_as_much_as_its_cross_section(flat: float):
     turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     ring = 0.2 * np.stack([np.cos(turn), flat * np.sin(turn)], 1)
     points = np.concatenate([np.insert(ring, 2, z, axis=1) for z in (0.1, 0.5, 0.9)])
-    radius = _round_radius(points, np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    assert radius == pytest.approx(0.2 * np.sqrt(flat))
+    ends = np.zeros(3), np.array([0.0, 0.0, 1.0])
+    assert round_radius(points, *ends) == pytest.approx(0.2 * np.sqrt(flat))
+    assert narrow_radius(points, *ends) == pytest.approx(0.2 * flat)
 
 
 def test_legs_far_apart_get_the_strength_to_stand(tmp_path: Path):
@@ -116,3 +117,17 @@ def test_a_file_with_many_clips_is_read_at_once(tmp_path: Path):
     file = tmp_path / "dog.glb"
     file.write_bytes(whole(description, blob))
     assert set(DOG) <= set(rig_of_glb(file).names)
+
+
+def test_a_foot_and_its_fixed_toes_are_one(tmp_path: Path):
+    """Each toe is a part of its own, and touches the floor."""
+    toe = {
+        f"{side}{name}": (f"{side}HindPaw", (x * sign, 2, -27), (x * sign, 0, -20))
+        for side, sign in (("Left", 1), ("Right", -1))
+        for name, x in (("Inner", 6), ("Outer", 10))
+    }
+    file = tmp_path / "dog.glb"
+    file.write_bytes(glb(DOG | toe))
+    creature = load_files(import_model(file, ImportChoices(apart=False)).files)
+    touching = {creature.model.geom_bodyid[g] for g in creature.feet.stepping}
+    assert len(touching) > len(creature.feet.names) == 4
