@@ -72,7 +72,10 @@ class _Body:
         self.joints = [j for j in joints if j.type[0] not in free and j.bodyid[0] != self.trunk.id]
         self.names = [j.name for j in self.joints]
         self.feet = list(
-            dict.fromkeys(int(self.model.geom(g).bodyid[0]) for g in self.identity["feet"])
+            dict.fromkeys(
+                int(self.model.body_weldid[self.model.geom(g).bodyid[0]])
+                for g in self.identity["feet"]
+            )
         )
 
     def pose(self, qpos: np.ndarray) -> None:

@@ -11,6 +11,7 @@ from importer.rigs import DOG, Bone, bvh, glb
 
 from mjxgait.animation.clips.read_glb import rig_of_glb
 from mjxgait.animation.clips.read_text import rig_of_bvh
+from mjxgait.certification.check_body import check_body
 from mjxgait.creature.scale import load_files
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.rig import Plan, hinges_of
@@ -131,3 +132,4 @@ def test_a_foot_and_its_fixed_toes_are_one(tmp_path: Path):
     creature = load_files(import_model(file, ImportChoices(apart=False)).files)
     touching = {creature.model.geom_bodyid[g] for g in creature.feet.stepping}
     assert len(touching) > len(creature.feet.names) == 4
+    check_body(creature)
