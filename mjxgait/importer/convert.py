@@ -43,11 +43,13 @@ from mjxgait.importer.worker import (
     compile_apart,
     compile_here,
 )
-from mjxgait.importer.write_toml import Settings, creature_toml, manner
+from mjxgait.importer.write_toml import GAIT, Settings, creature_toml, manner
 from mjxgait.importer.xacro import TEMPLATE, expanded
 
 XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
 """Files of a creature folder that an import makes."""
+NATURAL = (4, 6, 8)
+"""Numbers of feet on which a character has a natural gait unless it is given another."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -254,6 +256,9 @@ def _folder(
         length = hip
         why = "the hip height: the body is shorter than its legs, and speeds count in it"
         notes.guess("body_length", f"{hip:.3g}", "medium", why)
+    if is_rig and len(best.feet) in NATURAL:
+        why = "of random poses of its many joints few stand; --gait auto leaves it open"
+        notes.guess(GAIT, "natural", "medium", why)
     train = _train(best, mirror is not None, hip, length)
     toml = creature_toml(
         name,

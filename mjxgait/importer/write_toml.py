@@ -54,6 +54,9 @@ SMALLER = 0.03
 ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
+GAIT = "gait"
+"""Guess that a character walks as an animal of its number of feet does."""
+
 Settings = dict[str, Any]
 """Tables of settings, as in creature.toml below `[train]`."""
 Told = tuple[str, Confidence, str]
@@ -204,6 +207,8 @@ def creature_toml(
         lines.append("planar = true  # high: its legs are drawn in one plane, and pass each other")
     lines += ["", *_joints(joints, drive, remark), *_mirror(symmetric, pairs, remark)]
     lines += _rig(origin, bones)
+    if gait := remark.get(GAIT):
+        lines += ["[usual]", f'gait = "natural"{gait}', ""]
     lines += [*_corrections(drive), "[termination]", "min_up = 0.5", "height = [0.5, 1.5]"]
     heading, *settings = tomli_w.dumps({"train": train}).splitlines()
     lines += ["touch = true", "", heading + remark.get("train", ""), *settings, ""]

@@ -16,6 +16,7 @@ from mjxgait.creature.scale import load_files
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.rig import Plan, hinges_of
 from mjxgait.importer.rigged import narrow_radius, round_radius
+from mjxgait.tasks.walk.targets import WalkTargets, configured
 
 LOW: dict[str, Bone] = {
     "Belly": ("Hips", (0, 45, -20), None),
@@ -133,3 +134,14 @@ def test_a_foot_and_its_fixed_toes_are_one(tmp_path: Path):
     touching = {creature.model.geom_bodyid[g] for g in creature.feet.stepping}
     assert len(touching) > len(creature.feet.names) == 4
     check_body(creature)
+
+
+def test_a_character_on_four_feet_walks_as_an_animal(tmp_path: Path):
+    """Evolution begins near that walk, unless another gait is given, or any."""
+    file = tmp_path / "dog.bvh"
+    file.write_text(bvh(DOG))
+    creature = load_files(import_model(file, ImportChoices(apart=False)).files)
+    usual = configured(creature, None, {}, WalkTargets())
+    assert usual == configured(creature, None, {}, WalkTargets(gait="natural"))
+    assert usual.fitness.wish.gait == "walk"
+    assert configured(creature, None, {}, WalkTargets(gait="auto")).fitness.wish.gait == "auto"
