@@ -105,7 +105,7 @@ def _assemble(
                 _weights(settings.stepping.aside, names, "stepping.aside"),
                 _weights(settings.stepping.turn, names, "stepping.turn"),
                 found,
-                _foot_bodies(model, settings.creature.feet)[0],
+                _foot_bodies(model, settings)[0],
             ),
         ),
         feet=_feet(model, data, settings, trunk, axes),
@@ -156,7 +156,7 @@ def _frame(
 ) -> Frame:
     trunk = model.body(settings.creature.trunk).id
     rotation = data.xmat[trunk].reshape(3, 3).copy()
-    feet, _ = _foot_bodies(model, settings.creature.feet)
+    feet, _ = _foot_bodies(model, settings)
     ahead = (rotation @ axes[0]) * [1, 1, 0]
     ahead = ahead / np.linalg.norm(ahead)
     length = settings.creature.body_length
@@ -248,15 +248,13 @@ def _feet(
     trunk: int,
     axes: np.ndarray,
 ) -> Feet:
-    bodies, stepping = _foot_bodies(model, settings.creature.feet)
+    bodies, stepping = _foot_bodies(model, settings)
     kind = mujoco.mjtObj.mjOBJ_GEOM
     ground = [_id(model, kind, name, "creature.ground") for name in settings.creature.ground]
     nose = data.xmat[trunk].reshape(3, 3) @ axes[0] * [1, 1, 0]
     nose = nose / np.linalg.norm(nose)
     level = np.stack([nose, np.cross([0, 0, 1], nose)], 1)
-    foot_of = [
-        bodies.index(geometry.moving_body(model, int(model.geom_bodyid[g]))) for g in stepping
-    ]
+    foot_of = [bodies.index(_foot_body(model, settings, g)) for g in stepping]
     own = [
         [g for g, foot in zip(stepping, foot_of, strict=True) if foot == n]
         for n in range(len(bodies))
@@ -272,17 +270,21 @@ def _feet(
     )
 
 
-def _foot_bodies(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[list[int], list[int]]:
-    """Foot bodies, and foot geoms in the order of their feet.
-
-    Geoms of one body form one foot, also on parts that are fixed to it, such as toes.
-    """
+def _foot_bodies(model: mujoco.MjModel, settings: CreatureSettings) -> tuple[list[int], list[int]]:
+    """Foot bodies, and foot geoms in the order of their feet; geoms of one body form one foot."""
+    names = settings.creature.feet
     if not names:
         raise UserError("creature.feet is empty; name the geoms that step on the floor")
     geoms = [_id(model, mujoco.mjtObj.mjOBJ_GEOM, name, "creature.feet") for name in names]
-    body_of = {g: geometry.moving_body(model, int(model.geom_bodyid[g])) for g in geoms}
+    body_of = {g: _foot_body(model, settings, g) for g in geoms}
     bodies = list(dict.fromkeys(body_of.values()))
     return bodies, sorted(geoms, key=lambda g: bodies.index(body_of[g]))
+
+
+def _foot_body(model: mujoco.MjModel, settings: CreatureSettings, geom: int) -> int:
+    """The body of a geom; in a skeleton, where each bone is a part, the one it is fixed to."""
+    body = int(model.geom_bodyid[geom])
+    return geometry.moving_body(model, body) if settings.rig.bones else body
 
 
 def _forbidden(model: mujoco.MjModel, feet: list[int], ground: list[int]) -> list[int]:
