@@ -2,7 +2,8 @@
 
 import copy
 import dataclasses
-import itertools
+import functools
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
@@ -95,11 +96,17 @@ def standing(
 
     If the best one sinks, all are tried again with more strength.
     """
-    what, best = _best_pose(kinematics, offered, mirror, planar, notes, 1.0)
+    search = Search(kinematics, offered[0][1], mirror, planar)
+    poses = [(what, lambda q=q: q) for what, q in offered]
+    for seed, spread in enumerate(SPREADS):  # each is searched once, when it is first needed
+        found = functools.cache(lambda spread=spread, seed=seed: search.run(spread, seed)[0])
+        poses.append(("a search over leg bends", found))
+    attempt = functools.partial(_try, kinematics, planar, notes)
+    what, best = _best_pose(search, poses, functools.partial(attempt, 1.0))
     for stronger in STRONGER:
         if not best.held.sinks:
             break
-        other = _best_pose(kinematics, offered, mirror, planar, notes, stronger)
+        other = _best_pose(search, poses, functools.partial(attempt, stronger))
         what, best = max((what, best), other, key=lambda pair: pair[1].held.score)
     held = best.held
     notes.changes, notes.guesses = best.notes.changes, best.notes.guesses
@@ -122,27 +129,18 @@ def standing(
 
 
 def _best_pose(
-    kinematics: KinematicModel,
-    offered: list[tuple[str, np.ndarray]],
-    mirror: tuple[np.ndarray, np.ndarray] | None,
-    planar: bool,
-    notes: Notes,
-    stronger: float,
+    search: Search,
+    poses: Sequence[tuple[str, Callable[[], np.ndarray]]],
+    attempt: Callable[[np.ndarray], Candidate],
 ) -> tuple[str, Candidate]:
-    """Return a pose with its description; see `standing` and `plan_drive`."""
+    """Return a pose with its description; see `standing`. attempt: runs the stand test."""
     tried: list[tuple[str, Candidate]] = []
-    search = Search(kinematics, offered[0][1], mirror, planar)
-
-    def tries(what: str, q: np.ndarray) -> bool:
-        """Whether a pose stands on legs that have length left to step with."""
-        tried.append((what, _try(kinematics, q, mirror, planar, notes, stronger)))
-        return tried[-1][1].held.stands and search.stretch(q) < STRAIGHT
-
-    searched = (
-        ("a search over leg bends", search.run(spread, seed)[0])
-        for seed, spread in enumerate(SPREADS)
-    )
-    any(tries(what, q) for what, q in itertools.chain(offered, searched))
+    for what, pose in poses:
+        tried.append((what, attempt(pose())))
+        # Legs that are straight out have no length left to step with: such a pose is only the
+        # second choice.
+        if tried[-1][1].held.stands and search.stretch(tried[-1][1].q) < STRAIGHT:
+            break
     return max(
         tried, key=lambda pair: pair[1].held.score - 0.2 * (search.stretch(pair[1].q) > STRAIGHT)
     )
@@ -150,11 +148,10 @@ def _best_pose(
 
 def _try(
     kinematics: KinematicModel,
-    q: np.ndarray,
-    mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
     notes: Notes,
     stronger: float,
+    q: np.ndarray,
 ) -> Candidate:
     """Add foot geoms in a pose, and run the stand test. stronger: see `plan_drive`."""
     notes, trial = copy.deepcopy(notes), kinematics.copy()

@@ -128,7 +128,7 @@ def _turn(node: Part) -> np.ndarray:
 
 def _note(nodes: Sequence[Part]) -> str:
     """The note of an exported walk, found on one of its nodes; else empty."""
-    notes = (getattr(node.extras, NOTE, None) for node in nodes if node.extras is not None)
+    notes = (getattr(node.extras, NOTE, None) for node in nodes)
     return next((note for note in notes if isinstance(note, str)), "")
 
 
