@@ -123,7 +123,7 @@ def repertoire(
       seed: of all random numbers.
       rate: key frames per second of the clips.
       travelling: moves the root in the clips.
-      onto: the character (GLB) that the creature was imported from, whose file gets the clips.
+      onto: the character (GLB) of which the creature was imported; its file gets the clips.
       blends: tests blends and changes between neighbours too.
       quiet: prints nothing.
 

@@ -72,7 +72,7 @@ class _Body:
         self.joints = [j for j in joints if j.type[0] not in free and j.bodyid[0] != self.trunk.id]
         self.names = [j.name for j in self.joints]
         feet = [int(self.model.geom(g).bodyid[0]) for g in self.identity["feet"]]
-        if self.table.get("rig", {}).get("bones"):  # whose toes are parts that are fixed to a foot
+        if self.table.get("rig", {}).get("bones"):  # its toes are parts, fixed to a foot
             feet = [int(self.model.body_weldid[foot]) for foot in feet]
         self.feet = list(dict.fromkeys(feet))
 

@@ -77,7 +77,7 @@ def body_length(
 ) -> float:
     """Distance from the foremost to the hindmost point along a world direction [3]; m.
 
-    bodies: whose shapes count; None is all.
+    bodies: only their shapes count; None: those of all.
     """
     counted = range(1, model.nbody) if bodies is None else bodies
     parts = [g for g in range(model.ngeom) if model.geom_bodyid[g] in counted]

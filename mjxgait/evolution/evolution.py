@@ -171,7 +171,7 @@ class Evolution:
         evaluation: Evaluation,
         seeding: jax.Array,
     ) -> Normal | None:
-        """Return what a strategy knows after this generation, whose state is given.
+        """Return the distribution that a strategy has learnt after the generation of this state.
 
         It begins around the best of the first generation. It learns from children, not from the
         elite; where the old were evaluated instead of children it learns nothing.

@@ -183,7 +183,7 @@ def narrow_radius(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> flo
 
 
 def _half_widths(points: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Half axes [2] in m of the ellipse whose outline has the moments of points [V, 3]."""
+    """Half axes [2] in m of an ellipse; its outline has the moments of points [V, 3]."""
     across = np.linalg.svd(along[None])[2][1:]
     moments = np.linalg.eigvalsh(np.cov(across @ points.T, bias=True))
     widths: np.ndarray = np.sqrt(2.0 * np.maximum(moments, 0.0))

@@ -49,7 +49,7 @@ def rotation() -> np.ndarray:
 
 
 def ellipsoid(rows: jax.Array, optimum: float = 0.6) -> jax.Array:
-    """A rotated ellipsoid whose longest axis is ten times its shortest."""
+    """A rotated ellipsoid; its longest axis is ten times its shortest."""
     axes = 10 ** np.linspace(0, 1, GENES)
     return -jnp.sum(((rows - optimum) @ rotation() * axes) ** 2, axis=-1)
 

@@ -80,7 +80,7 @@ def test_a_bird_has_legs_beside_its_wings(tmp_path: Path):
 
 @pytest.mark.parametrize("flat", [1.0, 0.01])
 def test_a_wing_weighs_as_much_as_its_cross_section(flat: float):
-    """A bar with the area of an ellipse, whose axes are 0.2 m and a share of that."""
+    """A bar with the area of an ellipse with axes of 0.2 m and a share of that."""
     turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     ring = 0.2 * np.stack([np.cos(turn), flat * np.sin(turn)], 1)
     points = np.concatenate([np.insert(ring, 2, z, axis=1) for z in (0.1, 0.5, 0.9)])

@@ -168,7 +168,7 @@ def _fitting_strides(walk: Walk, rate: int, most: int) -> tuple[int, int, int, i
 
 
 def _alike(walk: Walk, rate: int) -> tuple[int, int, int, int] | None:
-    """The same of a body that grew, whose brain has no cycle: one time around."""
+    """The same of a body that grew; its brain has no cycle: one time around."""
     upright = walk.body_poses()[1][:, walk.creature.trunk].reshape(len(walk.qpos), 9)
     found = most_alike(walk.qpos[:, walk.creature.root_qpos + 7 :], upright, walk.time_step)
     return found and (*found, 1, max(round((found[1] - found[0]) * walk.time_step * rate), 2))

@@ -1,4 +1,4 @@
-"""The span after which a motion is most like it was: a loop of a body whose brain has no cycle.
+"""The span after which a motion is most like it was: a loop of a body without a cycle in its brain.
 
 Letters: `T` frames, `J` joints.
 """
@@ -18,7 +18,7 @@ LOOKAHEAD = 0.06
 def most_alike(
     angles: np.ndarray, attitude: np.ndarray, time_step: float
 ) -> tuple[int, int] | None:
-    """Return the two frames, a loop apart, whose poses are most alike; None of a short motion.
+    """Return the two frames, a loop apart, with the most similar poses; None: too short a motion.
 
     angles: [T, J] rad. attitude: [T, 9] the trunk's rotation. time_step: s.
     """

@@ -2,7 +2,7 @@
 //
 // Places are glTF's, in m. `scene` is the viewer's own.
 
-const FADE = 0.25; // Share of a member's space at whose ends marks grow and vanish.
+const FADE = 0.25; // Share of a member's space, at both ends, in which marks grow and vanish.
 const NEAR = 5; // Distance of the camera from one member, in units of its half size.
 const ASPECT = 1.6; // Width over height for which `far` is meant.
 
