@@ -14,7 +14,8 @@ from mjxgait.animation.clips.read_glb import rig_of_glb
 from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.errors import UserError
 from mjxgait.importer.notes import Confidence, Guess, Notes, listed, plain_names
-from mjxgait.importer.rig import Hinge, Plan, hinges_of
+from mjxgait.importer.rig import Plan
+from mjxgait.importer.rig_hinges import Hinge, hinges_of
 from mjxgait.importer.source import Source
 
 RIGS: Mapping[str, Callable[[Path], Rig]] = {".bvh": rig_of_bvh, ".glb": rig_of_glb}

@@ -14,7 +14,8 @@ from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.certification.check_body import check_body
 from mjxgait.creature.scale import load_files
 from mjxgait.importer import ImportChoices, import_model
-from mjxgait.importer.rig import Plan, hinges_of
+from mjxgait.importer.rig import Plan
+from mjxgait.importer.rig_hinges import hinges_of
 from mjxgait.importer.rigged import narrow_radius, round_radius
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 

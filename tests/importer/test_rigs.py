@@ -21,7 +21,8 @@ from mjxgait.creature.scale import load_files, scaled
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, Imported, import_model
 from mjxgait.importer.notes import Notes
-from mjxgait.importer.rig import Hinge, Plan, hinges_of
+from mjxgait.importer.rig import Plan
+from mjxgait.importer.rig_hinges import Hinge, hinges_of
 from mjxgait.importer.rigged import model_of
 
 FEET = ["LeftHand", "RightHand", "LeftHindPaw", "RightHindPaw"]
