@@ -44,11 +44,25 @@ class Plan:
 
     def in_middle(self, bone: int) -> bool:
         """Return whether a bone begins between left and right."""
-        return not self._paired[bone] and abs(self._apart(bone)) < MIDDLE * self.span
+        return not self._paired[bone] and self.apart(bone) < MIDDLE * self.span
 
-    def _apart(self, bone: int) -> float:
-        """Distance in m to the side of the root."""
+    def _aside(self, bone: int) -> float:
+        """Way in m from the root to the side."""
         return float(self.rig.places[bone, self.side] - self.rig.places[0, self.side])
+
+    def apart(self, bone: int) -> float:
+        """Distance in m to the side of the root."""
+        return abs(self._aside(bone))
+
+    @cached_property
+    def images(self) -> list[int]:
+        """Mirror image of each bone; the bone itself where there is none."""
+        own = np.concatenate([self.rig.places, self.tips], axis=1)
+        mirrored, sides = own.copy(), [self.side, self.side + 3]
+        mirrored[:, sides] = 2 * self.rig.places[0, self.side] - own[:, sides]
+        away = np.linalg.norm(own[:, None] - mirrored, axis=2)
+        near = away.min(0) < MIDDLE * self.span
+        return [int(i) for i in np.where(near, away.argmin(0), np.arange(len(own)))]
 
     @cached_property
     def _paired(self) -> list[bool]:
@@ -57,9 +71,9 @@ class Plan:
 
         def paired(bone: int) -> bool:
             image = places[bone].copy()
-            image[self.side] -= 2 * self._apart(bone)
+            image[self.side] -= 2 * self._aside(bone)
             brothers = self.rig.children(self.rig.parents[bone])
-            return abs(self._apart(bone)) > near and any(
+            return self.apart(bone) > near and any(
                 np.linalg.norm(places[other] - image) < near for other in brothers
             )
 
@@ -74,7 +88,7 @@ class Plan:
         """Sides of the limbs that begin at each bone or below it."""
         found: list[set[float]] = [set() for _ in self.rig.names]
         for bone in self.limbs:
-            found[bone].add(float(np.sign(self._apart(bone))))
+            found[bone].add(float(np.sign(self._aside(bone))))
         for bone in reversed(range(1, len(found))):
             found[self.rig.parents[bone]] |= found[bone]
         return found
@@ -82,7 +96,7 @@ class Plan:
     @cached_property
     def half_width(self) -> float:
         """Mean distance in m from the middle at which limbs begin."""
-        return float(np.mean([abs(self._apart(b)) for b in self.limbs])) if self.limbs else 0.0
+        return float(np.mean([self.apart(b) for b in self.limbs])) if self.limbs else 0.0
 
     def leaves_middle(self, bone: int) -> bool:
         """Return whether a limb or an ear leaves the trunk at this bone."""

@@ -12,7 +12,14 @@ import numpy as np
 from mjxgait.importer.notes import Confidence
 from mjxgait.importer.rig import SHORT, Plan, toes
 
-BENT = np.radians(8.0)
+MOVING, GIRDLE = 3, 0.75
+"""Most bones of a leg that move; share of the next bone's distance from the middle within which a
+limb's first bone belongs to the trunk.
+"""
+BENT, SIDEWAYS = np.radians(8.0), np.radians(25.0)
+"""Angles at rest from which two bones are bent; from which those of a hanging limb may bend
+sideways.
+"""
 SWING, SPREAD, SPINE, ANKLE, LOOSE = 60.0, 30.0, 25.0, 45.0, 45.0
 FOLD, STRETCH = 75.0, 3.0
 """deg that a knee folds from its rest pose; deg that it stays away from straight."""
@@ -58,23 +65,38 @@ def _spine_below(plan: Plan, bone: int) -> list[int]:
 
 
 def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
-    """Fill in the hinges of a limb, its side branches and toes rigid."""
-    chain = plan.limb(first)
-    ends = (i for i, bone in enumerate(chain) if bone in plan.feet or plan.has_toes(bone))
-    below = next(ends, len(chain))
-    *upper, last = chain[: below + 1]
-    chain = [*filter(plan.moves, upper), *[last] * (plan.reach(last) > SHORT * plan.height)]
+    """Fill in the hinges of a limb; its girdle, side branches and toes are rigid."""
+    chain = _bending(plan, first)
     if not chain:
         return
+    tip = plan.tips[first]
     ways = [plan.way(bone) for bone in chain]
-    if chain[-1] == last and last not in plan.feet:
-        ways[-1] = plan.tips[last] - plan.rig.places[last]
-    along = np.abs(plan.tips[first] - plan.rig.places[first])
+    if chain[-1] not in plan.feet:
+        ways[-1] = tip - plan.rig.places[chain[-1]]
+    along = np.abs(tip - plan.rig.places[chain[0]])
     vertical = int(along.argmax()) == plan.up
     found[chain[0]] = _hip(plan, int(along.argmax()))
     for (one, other), bone in zip(itertools.pairwise(ways), chain[1:], strict=True):
         is_last = bone == chain[-1]
         found[bone] = [_knee(plan, one, other, is_last, vertical, toes(plan, chain[-1]))]
+
+
+def _bending(plan: Plan, first: int) -> list[int]:
+    """Bones of a limb that move, from its beginning down.
+
+    A leg of more than three has more poses than a search can try: its girdle, such as a shoulder
+    blade, moves with the trunk, and its lowest bones with the one above, unless it stands on two
+    feet.
+    """
+    chain = plan.limb(first)
+    ends = (i for i, bone in enumerate(chain) if bone in plan.feet or plan.has_toes(bone))
+    *upper, last = chain[: next(ends, len(chain)) + 1]
+    chain = [*filter(plan.moves, upper), *[last] * (plan.reach(last) > SHORT * plan.height)]
+    if plan.feet:
+        return chain
+    if len(chain) > MOVING and plan.apart(chain[0]) < GIRDLE * plan.apart(chain[1]):
+        chain = chain[1:]
+    return chain[:MOVING]
 
 
 def _hip(plan: Plan, along: int) -> list[Hinge]:
@@ -91,9 +113,14 @@ def _hip(plan: Plan, along: int) -> list[Hinge]:
 def _knee(
     plan: Plan, one: np.ndarray, other: np.ndarray, last: bool, vertical: bool, forward: float
 ) -> Hinge:
-    """Hinge between two bones of a limb with directions [3], across the plane that they span."""
+    """Hinge between two bones of a limb with directions [3], across the plane that they span.
+
+    A hanging limb that is slightly bent to the side, as a horse's are, bends ahead or back.
+    """
     across = np.cross(one, other)
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
+    if vertical and float(np.linalg.norm(across)) < np.sin(SIDEWAYS) * size:
+        across = across * (np.arange(3) == plan.side)
     if float(np.linalg.norm(across)) > np.sin(BENT) * size:
         number = int(np.abs(across).argmax())
         axis = np.eye(3)[number]

@@ -55,7 +55,7 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
             f"{path}: all its bones begin in the middle; a creature needs legs to its left and right"
         )
     hinges = hinges_of(plan)
-    radii = [_radius(plan, bone) for bone in range(len(plan.rig.names))]
+    radii = radii_of(plan)
     names = plain_names(
         [name.rpartition(":")[2] for name in plan.rig.names],
         [f"bone_{i}" for i in range(len(plan.rig.names))],
@@ -147,6 +147,15 @@ def _measured(path: Path, rig: Rig, up: int, height: float | None, notes: Notes)
         f"{tall:.3g} units of the file, taken for {name}; --height says otherwise",
     )
     return rig.scaled(unit)
+
+
+def radii_of(plan: Plan) -> list[float]:
+    """Radius in m of each bone's capsules, alike on both sides: skins are seldom quite symmetric.
+
+    A body that is heavier on one side walks in a circle.
+    """
+    own = [_radius(plan, bone) for bone in range(len(plan.rig.names))]
+    return [(radius + own[image]) / 2 for radius, image in zip(own, plan.images, strict=True)]
 
 
 def _radius(plan: Plan, bone: int) -> float:

@@ -63,7 +63,7 @@ def test_what_hangs_in_the_middle_is_no_foot(tmp_path: Path):
     file.write_text(bvh(DOG | LOW))
     creature = load_files(import_model(file, ImportChoices(apart=False)).files)
     feet = {name.removesuffix("_foot") for name in creature.feet.names}
-    assert feet == {"LeftHand", "RightHand", "LeftHindPaw", "RightHindPaw"}
+    assert feet == {"LeftHand", "RightHand", "LeftHock", "RightHock"}
     # Without the tail, which ends at -0.78 m, and the head, which ends at 0.48 m.
     assert 0.44 < creature.frame.body_length < 0.75
 

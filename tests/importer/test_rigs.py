@@ -1,6 +1,7 @@
 """A character without a body: of its skeleton, as BVH or as a skinned GLB, a creature is made."""
 
 import contextlib
+import dataclasses
 import re
 import struct
 from collections.abc import Callable, Mapping
@@ -13,6 +14,7 @@ from importer.rigs import DOG, Bone, bvh, glb, stated_longer
 from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.clips.clip import Clip
+from mjxgait.animation.clips.read_glb import rig_of_glb
 from mjxgait.animation.clips.read_text import read_bvh, rig_of_bvh
 from mjxgait.animation.keys.retarget import axes_of, retarget
 from mjxgait.cli.import_ import import_command
@@ -23,9 +25,9 @@ from mjxgait.importer import ImportChoices, Imported, import_model
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_hinges import Hinge, hinges_of
-from mjxgait.importer.rigged import model_of
+from mjxgait.importer.rigged import model_of, radii_of
 
-FEET = ["LeftHand", "RightHand", "LeftHindPaw", "RightHindPaw"]
+FEET = ["LeftHand", "RightHand", "LeftHock", "RightHock"]
 SPIDER: dict[str, Bone] = {"Trunk": ("", (0, 10, 0), (0, 10, 8))} | {
     f"{name}{part}": (parent and (f"{name}{parent}" if part == "Shin" else parent), place, end)
     for name, sign, z in (("L1", 1, 6), ("L2", 1, -6), ("R1", -1, 6), ("R2", -1, -6))
@@ -203,8 +205,10 @@ def test_toes_are_one_with_their_foot_and_a_spur_is_no_toe(tmp_path: Path):
         for side, sign in (("Left", 1), ("Right", -1))
         for name, x in (("Inner", 6), ("Outer", 10))
     }
-    found = hinges(tmp_path, DOG | toes)
-    assert [len(found[name]) for name in ("LeftHindPaw", "LeftInner", "LeftOuter")] == [1, 0, 0]
+    short = {name: bone for name, bone in DOG.items() if "HindPaw" not in name}
+    short |= {name: (bone[0].replace("HindPaw", "Hock"), *bone[1:]) for name, bone in toes.items()}
+    found = hinges(tmp_path, short)
+    assert [len(found[name]) for name in ("LeftHock", "LeftInner", "LeftOuter")] == [1, 0, 0]
     spur = {"LeftTwist": ("LeftThigh", (9, 35, -24), (9, 34, -24))}
     assert len(hinges(tmp_path, DOG | spur)["LeftShin"]) == 1
 
@@ -242,10 +246,57 @@ def test_a_knee_that_rests_straight_folds_away_from_the_toes(tmp_path: Path):
 
 def test_a_knee_that_rests_bent_never_bends_the_other_way(tmp_path: Path):
     found = hinges(tmp_path, DOG)
-    for name, way in (("LeftShin", 1), ("LeftHock", -1), ("LeftForearm", -1)):
+    for name, way in (("LeftShin", 1), ("LeftForearm", -1)):
         (knee,) = found[name]
         assert way * (knee.high if way > 0 else knee.low) > way * -knee.low / 2
         assert abs(knee.low if way > 0 else knee.high) < 75.0
+
+
+def test_three_bones_of_a_leg_move(tmp_path: Path):
+    """A shoulder blade, a pelvis or a paw would be a fourth; on two feet an ankle may be one."""
+    girdle = {
+        f"{side}Blade": ("Chest", (sign * 2, 46, 2), None)
+        for side, sign in (("Left", 1), ("Right", -1))
+    }
+    wrist = {
+        f"{side}Wrist": (f"{side}Hand", (8 * sign, 2, 12), (8 * sign, 1, 18))
+        for side, sign in (("Left", 1), ("Right", -1))
+    }
+    hung = {f"{side}Arm": (f"{side}Blade", *DOG[f"{side}Arm"][1:]) for side in ("Left", "Right")}
+    found = hinges(tmp_path, DOG | girdle | hung | wrist)
+    front = [len(found[f"Left{name}"]) for name in ("Blade", "Arm", "Forearm", "Hand", "Wrist")]
+    hind = [len(found[f"Left{name}"]) for name in ("Thigh", "Shin", "Hock", "HindPaw")]
+    assert (front, hind) == ([0, 2, 1, 1, 0], [2, 1, 1, 0])
+
+
+def test_a_hanging_leg_that_is_slightly_bent_aside_bends_ahead(tmp_path: Path):
+    paws = {
+        f"{side}Hand": (f"{side}Forearm", (11 * sign, 6, 6), (11 * sign, 2, 6))
+        for side, sign in (("Left", 1), ("Right", -1))
+    }
+    upright = {
+        f"{side}Arm": ("Chest", (8 * sign, 42, 6), None)
+        for side, sign in (("Left", 1), ("Right", -1))
+    }
+    found = hinges(tmp_path, DOG | paws | upright)
+    assert [hinge.name for hinge in found["LeftForearm"]] == ["pitch"]
+
+
+def test_both_sides_are_as_thick(tmp_path: Path):
+    """Of a skin that is thicker on the left; a heavier side leads in a circle."""
+    file = tmp_path / "dog.glb"
+    file.write_bytes(glb(handles=False))
+    rig = rig_of_glb(file)
+    skins = tuple(
+        (rig.skins[b].mean(0) + 1.4 * (rig.skins[b] - rig.skins[b].mean(0)))
+        if name.startswith("Left")
+        else rig.skins[b]
+        for b, name in enumerate(rig.names)
+    )
+    plan = Plan(1, dataclasses.replace(rig, skins=skins))
+    radii = dict(zip(rig.names, radii_of(plan), strict=True))
+    assert radii["LeftThigh"] == radii["RightThigh"] > 1.1 * 0.03
+    assert radii["LeftArm"] == radii["RightArm"]
 
 
 def test_a_body_on_two_feet_has_heels(tmp_path: Path):

@@ -172,15 +172,28 @@ def _fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> F
             f"({creature.settings.rig.file}), or import this one and train it"
         )
     up = turn @ [0.0, 1.0, 0.0]
-    return dataclasses.replace(plain, shift=plain.shift + factor * _lowest_at_rest(loop) * up)
+    return dataclasses.replace(plain, shift=plain.shift + factor * _lows_at_rest(loop).min() * up)
 
 
-def _lowest_at_rest(loop: WalkLoop) -> float:
-    """Height in m of the lowest point of the feet in the rest pose."""
+def _lows_at_rest(loop: WalkLoop) -> np.ndarray:
+    """Heights [F] in m of the lowest points of the feet's geoms in the rest pose."""
     model, data = loop.walk.creature.model, mujoco.MjData(loop.walk.creature.model)
     data.qpos[:] = resting(loop)
     mujoco.mj_kinematics(model, data)
-    return min(-geom_reach(model, data, geom, DOWN) for geom in loop.walk.creature.feet.stepping)
+    geoms = loop.walk.creature.feet.stepping
+    return np.array([-geom_reach(model, data, geom, DOWN) for geom in geoms])
+
+
+def _bones_of_feet(loop: WalkLoop, names_of: Mapping[str, str]) -> list[str]:
+    """The bone of each foot that is lowest at rest: of a leg with a fixed paw, the paw."""
+    creature, lows = loop.walk.creature, _lows_at_rest(loop)
+    model, feet = creature.model, creature.feet
+    found = []
+    for foot, name in enumerate(feet.names):
+        lowest = np.where(feet.foot_of == foot, lows, np.inf).argmin()
+        part = model.body(model.geom_bodyid[feet.stepping[lowest]]).name
+        found.append(names_of.get(part, names_of.get(name, name)))
+    return found
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -308,8 +321,7 @@ def _finished(
         times = buffer.add(loop.times.astype(np.float32), bounds=True)
         for node, path in moving:
             add_channel(buffer, animation, times, node, path, tracks[name][node, path])
-        feet = [names_of.get(foot, foot) for foot in loop.walk.creature.feet.names]
-        falls = contacts(loop, feet) if loop.strides else []
+        falls = contacts(loop, _bones_of_feet(loop, names_of)) if loop.strides else []
         animation.extras = facts_of(loop, travelling, fit.factor) | {"contacts": falls}
         document.animations.append(animation)
     # glTF allows no key frames for a node that is placed by a matrix.
