@@ -3,15 +3,31 @@
 Letters: `J` active joints, `F` feet.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from mjxgait.creature.geometry import rotation
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.soles import Stance
 
-SPREADS = (0.4, 1.0, 1.6)
-"""rad, initial widths of the search around the file's pose."""
-FIRST, SAMPLES, ROUNDS, ELITE = 400, 40, 25, 10
+
+class Manner(NamedTuple):
+    """Manner of a search for a pose.
+
+    spread: rad, initial width around the file's pose. elite: poses of each round that go on.
+    beside: cost of the squared distance of the weight from the feet's middle, in hip heights.
+    """
+
+    spread: float
+    elite: int = 10
+    beside: float = 40.0
+
+
+SEARCHES = tuple(map(Manner, (0.4, 1.0, 1.6)))
+CAREFUL = tuple(Manner(1.6, 6, beside) for beside in (150.0, 400.0, 400.0))
+"""Searches for a body that falls: with a heavy head it stands with its feet beneath its weight."""
+FIRST, SAMPLES, ROUNDS = 400, 40, 25
 MARGIN = 0.25
 """rad that a joint should keep from its limit."""
 NEUTRAL = 0.9
@@ -113,6 +129,7 @@ class Search:
         planar: bool,
     ) -> None:
         self.kinematics, self.mirror, self.planar = kinematics, mirror, planar
+        self.beside = Manner(0.0).beside
         self.start = symmetric(np.clip(start, kinematics.low, kinematics.high), mirror)
         stance = stance_of(kinematics, self.start)
         self.hip = 0.85 * float(
@@ -153,10 +170,10 @@ class Search:
                 )
         return found
 
-    def run(self, spread: float, seed: int) -> tuple[np.ndarray, float]:
+    def run(self, manner: Manner, seed: int) -> tuple[np.ndarray, float]:
         """Return the best pose [J] found, and its cost."""
-        rng = np.random.default_rng(seed)
-        mean, width = self.start.copy(), np.full(len(self.start), spread)
+        rng, self.beside = np.random.default_rng(seed), manner.beside
+        mean, width = self.start.copy(), np.full(len(self.start), manner.spread)
         best, least = mean, self.cost(mean)
         for i in range(ROUNDS):
             shape = (SAMPLES, len(mean))
@@ -168,7 +185,7 @@ class Search:
                 for q in drawn
             ]
             costs = np.array([self.cost(q) for q in poses])
-            order = costs.argsort()[:ELITE]
+            order = costs.argsort()[: manner.elite]
             if costs[order[0]] < least:
                 best, least = poses[order[0]], float(costs[order[0]])
             elite = np.array([poses[i] for i in order])
@@ -224,7 +241,7 @@ class Search:
         low_trunk = max(0.6 - (xpos[0][2] - floor) / hip, 0.0)
         return float(
             400 * (((lows - floor) / hip) ** 2).sum()
-            + 40 * (beside[0] ** 2 + (0 if self.planar else beside[1] ** 2))
+            + self.beside * (beside[0] ** 2 + (0 if self.planar else beside[1] ** 2))
             + 20 * crouched
             + 40 * stretched
             + 0.3 * (near**2).mean()

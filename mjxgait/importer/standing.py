@@ -17,7 +17,9 @@ from mjxgait.importer.soles import guard_parts, lay_soles
 from mjxgait.importer.source import Source
 from mjxgait.importer.spec import tidy
 from mjxgait.importer.stance import (
-    SPREADS,
+    CAREFUL,
+    SEARCHES,
+    Manner,
     Search,
     drop,
     level,
@@ -30,8 +32,12 @@ STRAIGHT = 0.97
 """Straightness from which legs count as straight."""
 STRONGER = (2.0, 4.0)
 """Factors of strength for a body that sinks, tried in this order."""
+SEARCHED = "a search over leg bends"
 AT_ITS_END = 0.05
 """rad from an end of its range within which a joint rests on it."""
+
+Pose = Callable[[], np.ndarray]
+"""Computes a pose [J]."""
 
 
 @dataclasses.dataclass(eq=False)
@@ -97,17 +103,23 @@ def standing(
     If the best one sinks, all are tried again with more strength.
     """
     search = Search(kinematics, offered[0][1], mirror, planar)
-    poses = [(what, lambda q=q: q) for what, q in offered]
-    for seed, spread in enumerate(SPREADS):  # each is searched once, when it is first needed
-        found = functools.cache(lambda spread=spread, seed=seed: search.run(spread, seed)[0])
-        poses.append(("a search over leg bends", found))
+
+    def searched(manners: Sequence[Manner], seed: int) -> list[tuple[str, Pose]]:
+        # Each is searched once, when it is first needed.
+        runs = [functools.partial(search.run, m, seed + i) for i, m in enumerate(manners)]
+        return [(SEARCHED, functools.cache(lambda run=run: run()[0])) for run in runs]
+
+    poses = [(what, lambda q=q: q) for what, q in offered] + searched(SEARCHES, 0)
     attempt = functools.partial(_try, kinematics, planar, notes)
-    what, best = _best_pose(search, poses, functools.partial(attempt, 1.0))
+    found = _best_pose(search, poses, functools.partial(attempt, 1.0))
+    if not (found[1].held.stands or found[1].held.sinks):
+        careful = searched(CAREFUL, len(SEARCHES))
+        found = _better(found, _best_pose(search, careful, functools.partial(attempt, 1.0)))
     for stronger in STRONGER:
-        if not best.held.sinks:
+        if not found[1].held.sinks:
             break
-        other = _best_pose(search, poses, functools.partial(attempt, stronger))
-        what, best = max((what, best), other, key=lambda pair: pair[1].held.score)
+        found = _better(found, _best_pose(search, poses, functools.partial(attempt, stronger)))
+    what, best = found
     held = best.held
     notes.changes, notes.guesses = best.notes.changes, best.notes.guesses
     if held.stands:
@@ -128,9 +140,13 @@ def standing(
     return best
 
 
+def _better(one: tuple[str, Candidate], other: tuple[str, Candidate]) -> tuple[str, Candidate]:
+    return max(one, other, key=lambda pair: pair[1].held.score)
+
+
 def _best_pose(
     search: Search,
-    poses: Sequence[tuple[str, Callable[[], np.ndarray]]],
+    poses: Sequence[tuple[str, Pose]],
     attempt: Callable[[np.ndarray], Candidate],
 ) -> tuple[str, Candidate]:
     """Return a pose with its description; see `standing`. attempt: runs the stand test."""

@@ -57,6 +57,29 @@ BIRD = {
 }
 """Its thighs begin beside the middle, and its wings are far longer than its legs."""
 
+REX = {
+    "Hips": ("", (0, 95, 0), None),
+    "Chest": ("Hips", (0, 100, 45), None),
+    "Neck": ("Chest", (0, 120, 80), None),
+    "Head": ("Neck", (0, 140, 160), (0, 135, 210)),
+    "Tail": ("Hips", (0, 95, -10), (0, 90, -60)),
+    **sided(
+        {
+            "Thigh": ("Hips", (20, 92, 0), None),
+            "Shin": ("Thigh", (22, 58, 25), None),
+            "Ankle": ("Shin", (22, 30, -5), None),
+            "Foot": ("Ankle", (22, 8, 5), (22, 2, 35)),
+        }
+    ),
+}
+"""Far more of it is ahead of its feet than behind them."""
+
+
+def test_a_body_with_a_heavy_head_stands_with_its_feet_beneath_it(tmp_path: Path):
+    file = tmp_path / "rex.bvh"
+    file.write_text(bvh(REX))
+    assert import_model(file, ImportChoices(apart=False)).stands
+
 
 def test_what_hangs_in_the_middle_is_no_foot(tmp_path: Path):
     file = tmp_path / "dog.bvh"
