@@ -230,6 +230,6 @@ class Config:
 
     @property
     def wish(self) -> dict[str, float | str]:
-        """Walk targets by name; empty for tasks other than walk."""
+        """Walk targets by name that the certificate demands; empty for tasks other than walk."""
         targets = getattr(self.fitness, "wish", None)
-        return targets.table if targets is not None else {}
+        return targets.table if targets is not None and targets.binding else {}

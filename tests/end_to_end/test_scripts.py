@@ -31,6 +31,7 @@ BLENDER = "needs Blender as a module of Python"
 RAY = "needs Ray; tests/distributed/test_ray.py runs what it measures, where Ray is installed"
 ELSEWHERE = {
     "in_blender.py": BLENDER,
+    "strip_in_blender.py": BLENDER,
     "rig_of_blender.py": BLENDER,
     "blender.py": BLENDER,
     "cluster.py": RAY,

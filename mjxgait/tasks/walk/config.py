@@ -6,9 +6,11 @@ from typing import Annotated
 import pydantic
 
 from mjxgait.config.tables import (
+    ADDED,
     SHAPE,
     STRICT,
     Finite,
+    Flag,
     NonNegative,
     Positive,
     Whole,
@@ -119,6 +121,7 @@ class TargetConfig:
       reach: hip heights; mean position of the feet during stance, ahead of or behind where they
         stand at rest.
       pitch: deg, mean angle of the trunk's nose above the horizon.
+      binding: whether the certificate demands the targets too; if not, they only guide the search.
       weights: weight of each target.
     """
 
@@ -134,6 +137,7 @@ class TargetConfig:
     duty_factor: Positive | None = None
     reach: NonNegative | None = None
     pitch: Finite | None = None
+    binding: Annotated[Flag, SHAPE, ADDED] = True
     weights: TargetWeights = dataclasses.field(default_factory=TargetWeights)
 
     def __post_init__(self) -> None:

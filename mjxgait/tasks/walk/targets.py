@@ -84,8 +84,8 @@ def configured(
 ) -> Config:
     """Return the settings of a run: the layers below the options, and the targets on top.
 
-    Without targets and without a file, a walk has the creature's own default, `[usual]` in
-    creature.toml.
+    Without targets and without a file, the creature's own default, `[usual]` in creature.toml,
+    guides the search; the certificate does not demand it.
 
     Raises:
       UserError: names the layer and the key, or the target.
@@ -95,9 +95,11 @@ def configured(
     if targets != WalkTargets() or file is not None or not walks:
         return with_targets(config, creature, targets)
     try:
-        return with_targets(config, creature, WalkTargets(gait=creature.settings.usual.gait))
+        guided = with_targets(config, creature, WalkTargets(gait=creature.settings.usual.gait))
     except UserError as error:
         raise UserError(f"{creature.name}/creature.toml: [usual]: {error}") from None
+    free = dataclasses.replace(guided.fitness.wish, binding=not guided.fitness.wish.requested)
+    return dataclasses.replace(guided, fitness=dataclasses.replace(guided.fitness, wish=free))
 
 
 def with_targets(config: Config, creature: Creature, targets: WalkTargets) -> Config:

@@ -413,8 +413,18 @@ def natural_dog() -> Creature:
 
 def test_a_creature_can_set_a_default_gait():
     creature = natural_dog()
-    assert usually(creature) == usually(creature, gait="natural")
-    assert usually(creature).fitness.wish.stride == 1.0
+    usual, asked = usually(creature), usually(creature, gait="natural")
+    wish = dataclasses.replace(usual.fitness.wish, binding=True)
+    assert asked == dataclasses.replace(
+        usual, fitness=dataclasses.replace(usual.fitness, wish=wish)
+    )
+    assert wish.stride == 1.0
+
+
+def test_a_default_gait_guides_the_search_and_is_not_demanded():
+    creature = natural_dog()
+    assert usually(creature).wish == {}
+    assert usually(creature, gait="natural").wish["gait"] == "walk"
 
 
 @pytest.mark.parametrize("name", shipped_creatures())
