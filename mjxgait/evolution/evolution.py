@@ -14,15 +14,8 @@ import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.traced import chosen
-from mjxgait.evolution.breeding import (
-    Nursery,
-    families,
-    first_of_kind,
-    parents,
-    proportional_parents,
-    together,
-    with_share,
-)
+from mjxgait.evolution.breeding import families, first_of_kind, together, with_share
+from mjxgait.evolution.offspring import children, forced, pick_rows
 from mjxgait.evolution.state import (
     NOBODY,
     EvolutionState,
@@ -35,7 +28,7 @@ from mjxgait.evolution.state import (
 )
 from mjxgait.evolution.strategy import Normal, SeparableCma
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Evaluation, Tree
+from mjxgait.types import Evaluation
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -235,14 +228,16 @@ class Evolution:
         keys_forced = jax.random.split(key_forced, 2 + self.config.forced.mutations)
         created = self.variation.create(keys_forced[0], self.config.offspring)
         known = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
-        initial = _pick(places < self.config.population, known, created)
-        children, child_origin, of_child = self._children(key_children, state)
-        mutants, forced_origin, of_mutant = self._forced(keys_forced[1:], state, created)
+        initial = pick_rows(places < self.config.population, known, created)
+        bred, child_origin, of_child = self._children(key_children, state)
+        mutants, forced_origin, of_mutant = forced(
+            keys_forced[1:], self.config, self.variation, state, created
+        )
 
         def pick(first: jax.Array, second: jax.Array, third: jax.Array) -> jax.Array:
             return jnp.where(seeding, first, jnp.where(state.forced, second, third))
 
-        genomes = jax.tree.map(pick, initial, mutants, children)
+        genomes = jax.tree.map(pick, initial, mutants, bred)
         origin = pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
         if not self.config.follows or of_child is None:
             return genomes, origin, None
@@ -252,55 +247,12 @@ class Evolution:
     def _children(
         self, key: jax.Array, state: EvolutionState
     ) -> tuple[object, jax.Array, jax.Array | None]:
-        """Return genomes, origins and mothers' places; no places in sequential breeding."""
-        config, count = self.config, self.config.offspring
-        if state.normal is not None:
-            drawn = self._strategy.draw(key, state.normal, count)
-            return drawn, jnp.full(count, int(Origin.DRAWN)), None
-        if config.pool == "growing" or config.unique_children:
-            bred, of_two = Nursery(config, self.variation).children(key, state.genomes)
-            origin = jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION))
-            return bred, origin, None
-        key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
-        if config.proportional:
-            mothers, fathers = proportional_parents(key_parents, count, state.fitness)
-        else:
-            mothers, fathers = parents(
-                key_parents, count, config.population, config.selection, config.rivals
-            )
-        mother, father = (
-            jax.tree.map(lambda leaf, i=i: leaf[i], state.genomes) for i in (mothers, fathers)
-        )
-        crossed = jax.vmap(self.variation.cross)(jax.random.split(key_cross, count), mother, father)
-        crosses = jax.random.bernoulli(key_whether, config.crossover, (count,))
-        child = _pick(crosses, crossed, mother)
-        mutated = jax.vmap(self.variation.mutate)(jax.random.split(key_mutate, count), child)
-        # An unmutated child of one parent would be a duplicate; at rate 0 it is kept.
-        mutates = jax.random.bernoulli(key_mutated, config.mutation_rate, (count,)) | (
-            ~crosses & (config.mutation_rate > 0)
-        )
-        origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
-        return _pick(mutates, mutated, child), origin, mothers
-
-    def _forced(
-        self, keys: jax.Array, state: EvolutionState, created: object
-    ) -> tuple[object, jax.Array, jax.Array]:
-        """Return immigrants and repeatedly mutated genomes, origins, and the mutants' parents.
-
-        keys: [1 + mutations].
-        """
-        config, count = self.config.forced, self.config.offspring
-        newcomers = jnp.round(config.newcomers * count)
-        drawn = jax.random.randint(keys[0], (count,), 0, self.config.population)
-        mutants = jax.tree.map(lambda leaf: leaf[drawn], state.genomes)
-
-        def mutated(mutants: object, key: jax.Array) -> tuple[object, None]:
-            return jax.vmap(self.variation.mutate)(jax.random.split(key, count), mutants), None
-
-        mutants, _ = jax.lax.scan(mutated, mutants, keys[1:])
-        is_new = jnp.arange(count) < newcomers
-        genomes = _pick(is_new, created, mutants)
-        return genomes, jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)), drawn
+        """Return genomes drawn from the distribution, or bred, with their origins and mothers."""
+        if state.normal is None:
+            return children(key, self.config, self.variation, state)
+        count = self.config.offspring
+        drawn = self._strategy.draw(key, state.normal, count)
+        return drawn, jnp.full(count, int(Origin.DRAWN)), None
 
     def _plant(
         self,
@@ -365,13 +317,13 @@ class Evolution:
         anew = now if again else jnp.zeros((), bool)
         first = first_of_kind(self.config.same, self.variation, state, proposal, verdicts, anew)
         distinct = first | jnp.logical_not(self.config.remove_duplicates)
-        children = jnp.arange(fitness.shape[0]) >= count + self.config.elites
-        taken_in = admitted(self.config, state, fitness, children & distinct)
+        young = jnp.arange(fitness.shape[0]) >= count + self.config.elites
+        taken_in = admitted(self.config, state, fitness, young & distinct)
         stay = self._stay(state)
         if again:  # The old were not simulated in this round.
             fitness = jnp.where(fresh | stay | ~now, fitness, -jnp.inf)
         lives = distinct & (fresh | stay | chosen(self.config.survival, "best"))
-        tier = jnp.where(state.forced & children, jnp.where(taken_in, 2, 0), jnp.where(lives, 1, 0))
+        tier = jnp.where(state.forced & young, jnp.where(taken_in, 2, 0), jnp.where(lives, 1, 0))
         if not self.config.elites:  # the best always survives, whatever its tier
             best = jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)
             tier = jnp.where(best & distinct, 3, tier)
@@ -405,13 +357,6 @@ class Evolution:
 def _own(state: EvolutionState) -> jax.Array:
     """Return each individual's own place [P]."""
     return jnp.arange(state.fitness.shape[0])
-
-
-def _pick(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
-    """Choose row by row [M] from one of two pytrees of leaves [M, ...]."""
-    return jax.tree.map(
-        lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no
-    )
 
 
 def _without_key(state: EvolutionState) -> EvolutionState:

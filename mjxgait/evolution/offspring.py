@@ -1,0 +1,75 @@
+"""Offspring of a generation: children of two parents, and those of forced evolution (Wilson).
+
+Letters: `P` population, `M` offspring.
+"""
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.evolution.breeding import Nursery, parents, proportional_parents
+from mjxgait.evolution.state import EvolutionState, Origin
+from mjxgait.evolution.variation import Variation
+from mjxgait.types import Tree
+
+
+def children(
+    key: jax.Array, config: EvolutionConfig, variation: Variation, state: EvolutionState
+) -> tuple[object, jax.Array, jax.Array | None]:
+    """Return genomes [M, ...], origins and mothers' places; no places in sequential breeding."""
+    count = config.offspring
+    if config.pool == "growing" or config.unique_children:
+        bred, of_two = Nursery(config, variation).children(key, state.genomes)
+        return bred, jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION)), None
+    key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
+    if config.proportional:
+        mothers, fathers = proportional_parents(key_parents, count, state.fitness)
+    else:
+        mothers, fathers = parents(
+            key_parents, count, config.population, config.selection, config.rivals
+        )
+    mother, father = (
+        jax.tree.map(lambda leaf, i=i: leaf[i], state.genomes) for i in (mothers, fathers)
+    )
+    crossed = jax.vmap(variation.cross)(jax.random.split(key_cross, count), mother, father)
+    crosses = jax.random.bernoulli(key_whether, config.crossover, (count,))
+    child = pick_rows(crosses, crossed, mother)
+    mutated = jax.vmap(variation.mutate)(jax.random.split(key_mutate, count), child)
+    # An unmutated child of one parent would be a duplicate; at rate 0 it is kept.
+    mutates = jax.random.bernoulli(key_mutated, config.mutation_rate, (count,)) | (
+        ~crosses & (config.mutation_rate > 0)
+    )
+    origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
+    return pick_rows(mutates, mutated, child), origin, mothers
+
+
+def forced(
+    keys: jax.Array,
+    config: EvolutionConfig,
+    variation: Variation,
+    state: EvolutionState,
+    created: object,
+) -> tuple[object, jax.Array, jax.Array]:
+    """Return immigrants and repeatedly mutated genomes, origins, and the mutants' parents.
+
+    keys: [1 + mutations]. created: genomes [M, ...] of which the immigrants are the first.
+    """
+    count = config.offspring
+    newcomers = jnp.round(config.forced.newcomers * count)
+    drawn = jax.random.randint(keys[0], (count,), 0, config.population)
+    mutants = jax.tree.map(lambda leaf: leaf[drawn], state.genomes)
+
+    def mutated(mutants: object, key: jax.Array) -> tuple[object, None]:
+        return jax.vmap(variation.mutate)(jax.random.split(key, count), mutants), None
+
+    mutants, _ = jax.lax.scan(mutated, mutants, keys[1:])
+    is_new = jnp.arange(count) < newcomers
+    genomes = pick_rows(is_new, created, mutants)
+    return genomes, jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)), drawn
+
+
+def pick_rows(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
+    """Choose row by row [M] from one of two pytrees of leaves [M, ...]."""
+    return jax.tree.map(
+        lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no
+    )
