@@ -259,7 +259,7 @@ def _folder(
     if is_rig and len(best.feet) in NATURAL:
         why = "of random poses of its many joints few stand; --gait auto leaves it open"
         notes.guess(GAIT, "natural", "medium", why)
-    train = _train(best, mirror is not None, hip, length)
+    train = _train(best, mirror is not None, hip, length, is_rig)
     toml = creature_toml(
         name,
         origin,
@@ -314,10 +314,11 @@ def _sizes(best: Candidate, between_legs: bool) -> tuple[float, float]:
     return stance_of(best.kinematics, best.qpos[7:]).hip, length
 
 
-def _train(best: Candidate, symmetric: bool, hip: float, length: float) -> Settings:
+def _train(best: Candidate, symmetric: bool, hip: float, length: float, skeleton: bool) -> Settings:
     """Return the table `[train]`. hip, length: m, of the hip height and the body."""
     kinematics, steps = best.kinematics, bool(best.drive.ahead or best.drive.aside)
     step, mass = float(kinematics.model.opt.timestep), kinematics.mass
     rotor = float(np.median([joint.armature for joint in kinematics.joints]))
     legs, hinges = len(kinematics.feet), len(kinematics.joints)
-    return manner(steps, legs, hinges, symmetric, hip, length, mass, step, rotor, best.notes)
+    sizes = (hip, length, mass, step, rotor)
+    return manner(steps, legs, hinges, symmetric, *sizes, skeleton, best.notes)

@@ -54,6 +54,11 @@ SMALLER = 0.03
 ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
+FLICKER = 2.0
+"""Weight of feet that lose the floor for moments, of characters on more than two feet: their mass
+rests on small paws and hooves, which shake.
+"""
+
 GAIT = "gait"
 """Guess that a character walks as an animal of its number of feet does."""
 
@@ -73,6 +78,7 @@ def manner(
     mass: float,
     time_step: float,
     rotor: float,
+    skeleton: bool,
     notes: Notes,
 ) -> Settings:
     """Return the table `[train]` of an imported creature, and report its reason.
@@ -80,7 +86,7 @@ def manner(
     Args:
       steps: whether it must step to catch a fall. legs, hinges: their numbers. hip: m, height.
         length: m, of the body. mass: kg. time_step: s. rotor: kg m², the inertia of its typical
-        motor.
+        motor. skeleton: whether it was made from one.
     """
     bounces = rotor > mass * hip**2
     if steps:
@@ -89,6 +95,9 @@ def manner(
         settings, told = many_hinges(bounces, hip, length, time_step)
     else:
         settings, told = four_feet(bounces)
+    if skeleton and not steps:
+        settings["fitness"]["weights"]["patter"] = FLICKER
+        told = (f"{told[0]}; feet that flicker cost", *told[1:])
     notes.guess("train", *told)
     table: Settings = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings
     if not symmetric:

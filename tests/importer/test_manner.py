@@ -25,6 +25,7 @@ def told(hip: float = 0.8, length: float = 0.8, **facts: Any) -> tuple[Config, N
         "mass": 30.0,
         "time_step": STEP,
         "rotor": 0.01,
+        "skeleton": False,
     }
     settled |= facts
     table = manner(hip=hip, length=length, notes=notes, **settled)
@@ -57,6 +58,13 @@ def test_a_body_of_many_hinges_is_first_of_all_to_stay_up():
     assert told(hinges=12)[0] == told(hinges=13)[0]
     bouncing, _ = told(steps=False, legs=4, hinges=25, rotor=30.0)
     assert bouncing.fitness == dataclasses.replace(many.fitness, contact=0.0)
+
+
+def test_a_character_pays_for_feet_that_flicker():
+    """On two feet none was seen to flicker."""
+    robot, character = (told(steps=False, skeleton=skeleton)[0] for skeleton in (False, True))
+    assert character.fitness.weights.patter > robot.fitness.weights.patter == 0.0
+    assert told(skeleton=True)[0] == told()[0]
 
 
 def test_a_foot_of_one_that_bounces_is_down_where_it_bears_weight():
