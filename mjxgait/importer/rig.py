@@ -127,6 +127,15 @@ class Plan:
         return found
 
     @cached_property
+    def on_legs(self) -> list[bool]:
+        """Whether each bone belongs to a limb that ends at the floor."""
+        found: list[bool] = []
+        for bone, parent in enumerate(self.rig.parents):
+            low = self.tips[bone, self.up] - self.floor < LOW * self.height
+            found.append((bone in self.limbs and bool(low)) or (parent >= 0 and found[parent]))
+        return found
+
+    @cached_property
     def limbs(self) -> list[int]:
         """First bone of each limb."""
         return [bone for bone in range(len(self.rig.names)) if self.is_limb(bone)]

@@ -16,6 +16,7 @@ from mjxgait.errors import UserError
 from mjxgait.importer.notes import Confidence, Guess, Notes, listed, plain_names
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_hinges import Hinge, hinges_of
+from mjxgait.importer.rig_radii import SKINNED, THICK, radii_of, slimmer
 from mjxgait.importer.source import Source
 
 RIGS: Mapping[str, Callable[[Path], Rig]] = {".bvh": rig_of_bvh, ".glb": rig_of_glb}
@@ -27,13 +28,6 @@ MOST_BONES = 400
 METRES, CENTIMETRES = 4.0, 400.0
 """Heights in file units below which a skeleton is in metres, or in centimetres; else millimetres.
 """
-THICK, THIN, TRUNK, SLIM = 0.12, 0.008, 0.7, 0.2
-"""Radius of a limb's bone over its length; least radius over the creature's height; trunk radius
-over half its width between the limbs; radius of a neck or tail over its bones' length, at most half
-a trunk's.
-"""
-SKINNED = 8
-"""Least number of vertices that determine the thickness of a bone's part."""
 
 
 def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> Source:
@@ -55,7 +49,7 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
             f"{path}: all its bones begin in the middle; a creature needs legs to its left and right"
         )
     hinges = hinges_of(plan)
-    radii = radii_of(plan)
+    radii = slimmer(plan, hinges, radii_of(plan))
     names = plain_names(
         [name.rpartition(":")[2] for name in plan.rig.names],
         [f"bone_{i}" for i in range(len(plan.rig.names))],
@@ -147,64 +141,6 @@ def _measured(path: Path, rig: Rig, up: int, height: float | None, notes: Notes)
         f"{tall:.3g} units of the file, taken for {name}; --height says otherwise",
     )
     return rig.scaled(unit)
-
-
-def radii_of(plan: Plan) -> list[float]:
-    """Radius in m of each bone's capsules, alike on both sides: skins are seldom quite symmetric.
-
-    A body that is heavier on one side walks in a circle.
-    """
-    own = [_radius(plan, bone) for bone in range(len(plan.rig.names))]
-    return [(radius + own[image]) / 2 for radius, image in zip(own, plan.images, strict=True)]
-
-
-def _radius(plan: Plan, bone: int) -> float:
-    """Radius in m of a bone's capsules, from its skin where there is one."""
-    rig = plan.rig
-    segments = plan.segments(bone)
-    length = max((float(np.linalg.norm(b - a)) for a, b in segments), default=0.0)
-    if len(rig.skins[bone]) >= SKINNED and segments:
-        away = np.min([_distances(rig.skins[bone], a, b) for a, b in segments], axis=0)
-        form = narrow_radius if plan.in_middle(bone) else round_radius
-        radius = min(float(np.median(away)), form(rig.skins[bone], *segments[0]))
-        return float(np.clip(radius, THIN * plan.height, 0.3 * plan.height))
-    least = THIN * plan.height
-    sideways = int(np.abs(plan.way(bone)).argmax()) == plan.side  # such as a collar bone
-    if plan.carries(bone) and not sideways:
-        return max(TRUNK * plan.half_width, least)
-    share, most = (SLIM, 0.5) if plan.in_middle(bone) else (THICK, 1.0)
-    return max(min(share * length, most * TRUNK * plan.half_width or np.inf), least)
-
-
-def round_radius(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
-    """Radius in m of a round bar with the area of the cross-section of points [V, 3].
-
-    That of a wing or a fin, which is broad and flat, is far smaller than its points' distance.
-    """
-    return float(_half_widths(points, end - start).prod() ** 0.5)
-
-
-def narrow_radius(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
-    """Radius in m of a round bar that is as wide as the cross-section where it is narrowest.
-
-    A chest is higher than wide; a rounder one would have the arms in it.
-    """
-    return float(_half_widths(points, end - start).min())
-
-
-def _half_widths(points: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Half axes [2] in m of an ellipse; its outline has the moments of points [V, 3]."""
-    across = np.linalg.svd(along[None])[2][1:]
-    moments = np.linalg.eigvalsh(np.cov(across @ points.T, bias=True))
-    widths: np.ndarray = np.sqrt(2.0 * np.maximum(moments, 0.0))
-    return widths
-
-
-def _distances(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Distances [V] in m of points [V, 3] from the segment between two ends."""
-    along = b - a
-    share = np.clip((points - a) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-    return np.linalg.norm(points - a - share[:, None] * along, axis=1)
 
 
 def _tree(

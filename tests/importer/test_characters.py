@@ -16,7 +16,7 @@ from mjxgait.creature.scale import load_files
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_hinges import hinges_of
-from mjxgait.importer.rigged import narrow_radius, round_radius
+from mjxgait.importer.rig_radii import narrow_radius, round_radius
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 
 LOW: dict[str, Bone] = {

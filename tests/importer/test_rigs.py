@@ -25,7 +25,8 @@ from mjxgait.importer import ImportChoices, Imported, import_model
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_hinges import Hinge, hinges_of
-from mjxgait.importer.rigged import model_of, radii_of
+from mjxgait.importer.rig_radii import radii_of, slimmer
+from mjxgait.importer.rigged import model_of
 
 FEET = ["LeftHand", "RightHand", "LeftHock", "RightHock"]
 SPIDER: dict[str, Bone] = {"Trunk": ("", (0, 10, 0), (0, 10, 8))} | {
@@ -297,6 +298,21 @@ def test_both_sides_are_as_thick(tmp_path: Path):
     radii = dict(zip(rig.names, radii_of(plan), strict=True))
     assert radii["LeftThigh"] == radii["RightThigh"] > 1.1 * 0.03
     assert radii["LeftArm"] == radii["RightArm"]
+
+
+def test_legs_are_slimmer_than_the_space_between_other_parts(tmp_path: Path):
+    """Fat shins, which fold against the belly; thighs and arms hang on the trunk."""
+    file = tmp_path / "dog.bvh"
+    file.write_text(bvh(DOG))
+    plan = Plan(1, rig_of_bvh(file))
+    names = plan.rig.names
+    fat = [10.0 if name.endswith("Shin") else 2.0 for name in names]
+    slim = dict(zip(names, slimmer(plan, hinges_of(plan), fat), strict=True))
+    assert slim["LeftShin"] == slim["RightShin"] == pytest.approx(8.0)  # 16 cm apart
+    assert {slim[name] for name in names if not name.endswith("Shin")} == {2.0}
+    fatter = [20.0 if name.endswith("Shin") else 2.0 for name in names]
+    slim = dict(zip(names, slimmer(plan, hinges_of(plan), fatter), strict=True))
+    assert slim["LeftShin"] == 10.0, "half as thick at least"
 
 
 def test_a_body_on_two_feet_has_heels(tmp_path: Path):
