@@ -54,9 +54,10 @@ SMALLER = 0.03
 ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
-FLICKER = 2.0
+FLICKER, LEISURE = 2.0, 0.65
 """Weight of feet that lose the floor for moments, of characters on more than two feet: their mass
-rests on small paws and hooves, which shake.
+rests on small paws and hooves, which shake. And their target speed in body lengths per second: at
+the usual one they gallop.
 """
 
 GAIT = "gait"
@@ -96,8 +97,9 @@ def manner(
     else:
         settings, told = four_feet(bounces)
     if skeleton and not steps:
+        settings["fitness"]["speed"] = LEISURE
         settings["fitness"]["weights"]["patter"] = FLICKER
-        told = (f"{told[0]}; feet that flicker cost", *told[1:])
+        told = (f"{told[0]}; feet that flicker cost; {LEISURE:g} body lengths/s", *told[1:])
     notes.guess("train", *told)
     table: Settings = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings
     if not symmetric:

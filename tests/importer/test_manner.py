@@ -60,10 +60,12 @@ def test_a_body_of_many_hinges_is_first_of_all_to_stay_up():
     assert bouncing.fitness == dataclasses.replace(many.fitness, contact=0.0)
 
 
-def test_a_character_pays_for_feet_that_flicker():
-    """On two feet none was seen to flicker."""
+def test_a_character_walks_at_leisure_and_pays_for_feet_that_flicker():
+    """On two feet none was seen to flicker, and slower it would stand on one."""
     robot, character = (told(steps=False, skeleton=skeleton)[0] for skeleton in (False, True))
     assert character.fitness.weights.patter > robot.fitness.weights.patter == 0.0
+    least = CertificateConfig().progress.speed
+    assert 1.2 * least < character.fitness.speed < robot.fitness.speed
     assert told(skeleton=True)[0] == told()[0]
 
 
