@@ -26,7 +26,7 @@ class Manner(NamedTuple):
 
 SEARCHES = tuple(map(Manner, (0.4, 1.0, 1.6)))
 CAREFUL = tuple(Manner(1.6, 6, beside) for beside in (150.0, 400.0, 400.0))
-"""Searches for a body that falls: with a heavy head it stands with its feet beneath its weight."""
+"""Searches for a body that falls off its two feet: a heavy head needs them beneath its weight."""
 FIRST, SAMPLES, ROUNDS = 400, 40, 25
 MARGIN = 0.25
 """rad that a joint should keep from its limit."""

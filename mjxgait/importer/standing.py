@@ -100,7 +100,8 @@ def standing(
 ) -> Candidate:
     """Return the first pose that stands, of the file's and the search's; else the best one.
 
-    If the best one sinks, all are tried again with more strength.
+    A body that falls off its two feet is searched again, with them beneath its weight. If the best
+    one sinks, all are tried again with more strength.
     """
     search = Search(kinematics, offered[0][1], mirror, planar)
 
@@ -112,7 +113,7 @@ def standing(
     poses = [(what, lambda q=q: q) for what, q in offered] + searched(SEARCHES, 0)
     attempt = functools.partial(_try, kinematics, planar, notes)
     found = _best_pose(search, poses, functools.partial(attempt, 1.0))
-    if not (found[1].held.stands or found[1].held.sinks):
+    if len(kinematics.feet) == 2 and not (found[1].held.stands or found[1].held.sinks):
         careful = searched(CAREFUL, len(SEARCHES))
         found = _better(found, _best_pose(search, careful, functools.partial(attempt, 1.0)))
     for stronger in STRONGER:
