@@ -223,7 +223,7 @@ GAIT = (
     Entry(
         "flicker of a foot per stride",
         "Its feet lose the floor for a moment {v:.1f} times in a stride; {t:.0f} times is allowed.",
-        "Give contact flicker a price: --fitness.weights.patter 1.",
+        "Make contact flicker dearer: a higher --fitness.weights.patter, such as 3.",
     ),
     Entry(
         "buzz of a joint / joint speed",
