@@ -114,26 +114,29 @@ class Plan:
 
     def _comes_down(self, bone: int) -> bool:
         """Return whether a branch descends to the floor, as the short legs of a winged bird do."""
-        least = LOW * self.height
-        top, tip = self.rig.places[bone, self.up], self.tips[bone, self.up]
-        return bool(tip - self.floor < least < top - tip)
+        drop = self.rig.places[bone, self.up] - self.tips[bone, self.up]
+        return self._ends_low(bone) and bool(LOW * self.height < drop)
 
     @cached_property
     def on_limbs(self) -> list[bool]:
         """Whether each bone belongs to a limb, or to what hangs on one; tails and bellies do not."""
-        found: list[bool] = []
-        for bone, parent in enumerate(self.rig.parents):
-            found.append(bone in self.limbs or (parent >= 0 and found[parent]))
-        return found
+        return self._below(set(self.limbs))
 
     @cached_property
     def on_legs(self) -> list[bool]:
         """Whether each bone belongs to a limb that ends at the floor."""
+        return self._below(set(filter(self._ends_low, self.limbs)))
+
+    def _below(self, firsts: set[int]) -> list[bool]:
+        """Return whether each bone is one of these or below one."""
         found: list[bool] = []
         for bone, parent in enumerate(self.rig.parents):
-            low = self.tips[bone, self.up] - self.floor < LOW * self.height
-            found.append((bone in self.limbs and bool(low)) or (parent >= 0 and found[parent]))
+            found.append(bone in firsts or (parent >= 0 and found[parent]))
         return found
+
+    def _ends_low(self, first: int) -> bool:
+        """Return whether the limb that a bone belongs to ends at the floor."""
+        return bool(self.tips[first, self.up] - self.floor < LOW * self.height)
 
     @cached_property
     def limbs(self) -> list[int]:

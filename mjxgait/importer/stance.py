@@ -12,8 +12,8 @@ from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.soles import Stance
 
 
-class Manner(NamedTuple):
-    """Manner of a search for a pose.
+class Sampling(NamedTuple):
+    """Settings of a search for a pose.
 
     spread: rad, initial width around the file's pose. elite: poses of each round that go on.
     beside: cost of the squared distance of the weight from the feet's middle, in hip heights.
@@ -24,8 +24,8 @@ class Manner(NamedTuple):
     beside: float = 40.0
 
 
-SEARCHES = tuple(map(Manner, (0.4, 1.0, 1.6)))
-CAREFUL = tuple(Manner(1.6, 6, beside) for beside in (150.0, 400.0, 400.0))
+SEARCHES = tuple(map(Sampling, (0.4, 1.0, 1.6)))
+CAREFUL = tuple(Sampling(1.6, 6, beside) for beside in (150.0, 400.0, 400.0))
 """Searches for a body that falls off its two feet: a heavy head needs them beneath its weight."""
 FIRST, SAMPLES, ROUNDS = 400, 40, 25
 MARGIN = 0.25
@@ -129,7 +129,6 @@ class Search:
         planar: bool,
     ) -> None:
         self.kinematics, self.mirror, self.planar = kinematics, mirror, planar
-        self.beside = Manner(0.0).beside
         self.start = symmetric(np.clip(start, kinematics.low, kinematics.high), mirror)
         stance = stance_of(kinematics, self.start)
         self.hip = 0.85 * float(
@@ -170,11 +169,11 @@ class Search:
                 )
         return found
 
-    def run(self, manner: Manner, seed: int) -> tuple[np.ndarray, float]:
-        """Return the best pose [J] found, and its cost."""
-        rng, self.beside = np.random.default_rng(seed), manner.beside
-        mean, width = self.start.copy(), np.full(len(self.start), manner.spread)
-        best, least = mean, self.cost(mean)
+    def run(self, sampling: Sampling, seed: int) -> np.ndarray:
+        """Return the best pose [J] found."""
+        rng, beside = np.random.default_rng(seed), sampling.beside
+        mean, width = self.start.copy(), np.full(len(self.start), sampling.spread)
+        best, least = mean, self.cost(mean, beside)
         for i in range(ROUNDS):
             shape = (SAMPLES, len(mean))
             drawn = mean + width * (
@@ -184,13 +183,13 @@ class Search:
                 symmetric(np.clip(q, self.kinematics.low, self.kinematics.high), self.mirror)
                 for q in drawn
             ]
-            costs = np.array([self.cost(q) for q in poses])
-            order = costs.argsort()[: manner.elite]
+            costs = np.array([self.cost(q, beside) for q in poses])
+            order = costs.argsort()[: sampling.elite]
             if costs[order[0]] < least:
                 best, least = poses[order[0]], float(costs[order[0]])
             elite = np.array([poses[i] for i in order])
             mean, width = elite.mean(0), elite.std(0) + 1e-3
-        return best, least
+        return best
 
     def stretch(self, q: np.ndarray) -> float:
         """Mean straightness of the legs in a pose [J]."""
@@ -203,8 +202,8 @@ class Search:
             ratios.append(straightness(path))
         return float(np.mean(ratios))
 
-    def cost(self, q: np.ndarray) -> float:
-        """Cost of a stance [J].
+    def cost(self, q: np.ndarray, beside: float) -> float:
+        """Cost of a stance [J]. beside: see `Sampling`.
 
         Terms: uneven feet, weight beside them, other parts low, stretched legs, feet within the
         hips, closeness to limits, distance from the file's pose.
@@ -217,7 +216,7 @@ class Search:
         middles = np.array(
             [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * hip].mean(0) for sole in soles]
         )
-        beside = (kinematics.centre_of_mass() - middles.mean(0))[:2] / hip
+        off = (kinematics.centre_of_mass() - middles.mean(0))[:2] / hip
         others = [kinematics.lowest(xpos, xrot, s) - floor for s in self.segments]
         others.append(kinematics.shank_height(xpos, xrot) - floor)
         crouched = sum(max(0.2 - h / hip, 0.0) for h in others)
@@ -241,7 +240,7 @@ class Search:
         low_trunk = max(0.6 - (xpos[0][2] - floor) / hip, 0.0)
         return float(
             400 * (((lows - floor) / hip) ** 2).sum()
-            + self.beside * (beside[0] ** 2 + (0 if self.planar else beside[1] ** 2))
+            + beside * (off[0] ** 2 + (0 if self.planar else off[1] ** 2))
             + 20 * crouched
             + 40 * stretched
             + 0.3 * (near**2).mean()

@@ -19,7 +19,7 @@ from mjxgait.importer.spec import tidy
 from mjxgait.importer.stance import (
     CAREFUL,
     SEARCHES,
-    Manner,
+    Sampling,
     Search,
     drop,
     level,
@@ -105,10 +105,10 @@ def standing(
     """
     search = Search(kinematics, offered[0][1], mirror, planar)
 
-    def searched(manners: Sequence[Manner], seed: int) -> list[tuple[str, Pose]]:
+    def searched(samplings: Sequence[Sampling], seed: int) -> list[tuple[str, Pose]]:
         # Each is searched once, when it is first needed.
-        runs = [functools.partial(search.run, m, seed + i) for i, m in enumerate(manners)]
-        return [(SEARCHED, functools.cache(lambda run=run: run()[0])) for run in runs]
+        runs = [functools.partial(search.run, s, seed + i) for i, s in enumerate(samplings)]
+        return [(SEARCHED, functools.cache(run)) for run in runs]
 
     poses = [(what, lambda q=q: q) for what, q in offered] + searched(SEARCHES, 0)
     attempt = functools.partial(_try, kinematics, planar, notes)

@@ -316,12 +316,13 @@ def _finished(
     buffer, names = Buffer(document), _free_names(loops, character.clips)
     moving = _moving(character, tracks.values())
     names_of = {part: name_of(character.nodes, node) for part, node in bones.items()}
+    feet = _bones_of_feet(next(iter(loops.values())), names_of)
     for name, loop in loops.items():
         animation = gltf.Animation(name=names[name])
         times = buffer.add(loop.times.astype(np.float32), bounds=True)
         for node, path in moving:
             add_channel(buffer, animation, times, node, path, tracks[name][node, path])
-        falls = contacts(loop, _bones_of_feet(loop, names_of)) if loop.strides else []
+        falls = contacts(loop, feet) if loop.strides else []
         animation.extras = facts_of(loop, travelling, fit.factor) | {"contacts": falls}
         document.animations.append(animation)
     # glTF allows no key frames for a node that is placed by a matrix.
