@@ -315,6 +315,17 @@ def test_legs_are_slimmer_than_the_space_between_other_parts(tmp_path: Path):
     assert slim["LeftShin"] == 10.0, "half as thick at least"
 
 
+def test_an_imported_character_has_slim_legs(tmp_path: Path):
+    """Its skin is 10 cm thick, and its shins are 16 cm apart."""
+    file = tmp_path / "dog.glb"
+    file.write_bytes(glb(thick=0.1))
+    tree = model_of(file, None, None, Notes()).tree
+    sizes = {b.get("name"): b.find("geom") for b in tree.iter("body")}
+    shins = [float(sizes[name].get("size")) for name in ("LeftShin", "RightShin")]
+    assert max(shins) == pytest.approx(min(shins))
+    assert max(shins) < 0.081
+
+
 def test_a_body_on_two_feet_has_heels(tmp_path: Path):
     file = tmp_path / "human.bvh"
     file.write_text(bvh(HUMAN))
