@@ -43,7 +43,8 @@ from mjxgait.importer.worker import (
     compile_apart,
     compile_here,
 )
-from mjxgait.importer.write_toml import GAIT, Settings, creature_toml, manner
+from mjxgait.importer.train_table import Settings, manner
+from mjxgait.importer.write_toml import GAIT, creature_toml
 from mjxgait.importer.xacro import TEMPLATE, expanded
 
 XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")

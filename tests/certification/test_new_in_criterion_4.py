@@ -7,7 +7,7 @@ import pytest
 from mjxgait.api import load_creature
 from mjxgait.certification import CertificateConfig
 from mjxgait.config.schema import Config, RolloutConfig
-from mjxgait.importer.write_toml import few_feet, four_feet
+from mjxgait.importer.train_table import few_feet, four_feet
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 

@@ -10,7 +10,7 @@ from mjxgait.config.layers import over_base
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import build
 from mjxgait.importer.notes import Notes
-from mjxgait.importer.write_toml import manner
+from mjxgait.importer.train_table import manner
 
 STEP = 0.005
 
