@@ -37,13 +37,13 @@ from mjxgait.importer.standing import (
     offered_poses,
     standing,
 )
+from mjxgait.importer.train_table import Settings, Traits, train_table
 from mjxgait.importer.worker import (
     GIGABYTES,
     SECONDS,
     compile_apart,
     compile_here,
 )
-from mjxgait.importer.train_table import Settings, manner
 from mjxgait.importer.write_toml import GAIT, creature_toml
 from mjxgait.importer.xacro import TEMPLATE, expanded
 
@@ -317,9 +317,17 @@ def _sizes(best: Candidate, between_legs: bool) -> tuple[float, float]:
 
 def _train(best: Candidate, symmetric: bool, hip: float, length: float, skeleton: bool) -> Settings:
     """Return the table `[train]`. hip, length: m, of the hip height and the body."""
-    kinematics, steps = best.kinematics, bool(best.drive.ahead or best.drive.aside)
-    step, mass = float(kinematics.model.opt.timestep), kinematics.mass
-    rotor = float(np.median([joint.armature for joint in kinematics.joints]))
-    legs, hinges = len(kinematics.feet), len(kinematics.joints)
-    sizes = (hip, length, mass, step, rotor)
-    return manner(steps, legs, hinges, symmetric, *sizes, skeleton, best.notes)
+    body = best.kinematics
+    traits = Traits(
+        steps=bool(best.drive.ahead or best.drive.aside),
+        legs=len(body.feet),
+        hinges=len(body.joints),
+        symmetric=symmetric,
+        hip=hip,
+        length=length,
+        mass=body.mass,
+        time_step=float(body.model.opt.timestep),
+        rotor=float(np.median([joint.armature for joint in body.joints])),
+        skeleton=skeleton,
+    )
+    return train_table(traits, best.notes)

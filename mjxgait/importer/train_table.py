@@ -1,5 +1,6 @@
 """Table `[train]` of an imported creature: how a body of its class is evolved."""
 
+import dataclasses
 from typing import Any
 
 from mjxgait.config.schema import Config
@@ -58,91 +59,95 @@ Told = tuple[str, Confidence, str]
 """The choice, its confidence and its reason."""
 
 
-def manner(
-    steps: bool,
-    legs: int,
-    hinges: int,
-    symmetric: bool,
-    hip: float,
-    length: float,
-    mass: float,
-    time_step: float,
-    rotor: float,
-    skeleton: bool,
-    notes: Notes,
-) -> Settings:
-    """Return the table `[train]` of an imported creature, and report its reason.
+@dataclasses.dataclass(frozen=True)
+class Traits:
+    """What decides how a body is evolved.
 
-    Args:
-      steps: whether it must step to catch a fall. legs, hinges: their numbers. hip: m, height.
-        length: m, of the body. mass: kg. time_step: s. rotor: kg m², the inertia of its typical
-        motor. skeleton: whether it was made from one.
+    steps: whether it must step to catch a fall. legs, hinges: their numbers. hip: m, height.
+    length: m, of the body. mass: kg. time_step: s. rotor: kg m², the inertia of its typical motor.
+    skeleton: whether it was made from one.
     """
-    bounces = rotor > mass * hip**2
-    if steps:
-        settings, told = few_feet(legs, hip, length, mass, time_step)
-    elif hinges > MANY * legs:
-        settings, told = many_hinges(bounces, hip, length, time_step)
+
+    steps: bool
+    legs: int
+    hinges: int
+    symmetric: bool
+    hip: float
+    length: float
+    mass: float
+    time_step: float
+    rotor: float
+    skeleton: bool
+
+    @property
+    def bounces(self) -> bool:
+        """Whether its motors are heavier to turn than all of it."""
+        return self.rotor > self.mass * self.hip**2
+
+    def steps_between_poses(self, speed: float) -> int:
+        """Steps between poses that avoid too short strides at this speed in body lengths/s."""
+        return unhurried(LEAST * self.hip / (speed * self.length), self.time_step)
+
+
+def train_table(body: Traits, notes: Notes) -> Settings:
+    """Return the table `[train]` of an imported creature, and report its reason."""
+    if body.steps:
+        settings, told = few_feet(body)
+    elif body.hinges > MANY * body.legs:
+        settings, told = many_hinges(body)
     else:
-        settings, told = four_feet(bounces)
-    if skeleton and not steps:
+        settings, told = four_feet(body)
+    if body.skeleton and not body.steps:
         settings["fitness"]["speed"] = LEISURE
         settings["fitness"]["weights"]["patter"] = FLICKER
         told = (f"{told[0]}; feet that flicker cost; {LEISURE:g} body lengths/s", *told[1:])
     notes.guess("train", *told)
     table: Settings = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings
-    if not symmetric:
+    if not body.symmetric:
         table.setdefault("controller", {})["key_poses"] = 2 * Config().controller.key_poses
     return table
 
 
-def four_feet(bounces: bool) -> tuple[Settings, Told]:
-    """Settings of a body that stands on its feet; see `manner`.
+def four_feet(body: Traits) -> tuple[Settings, Told]:
+    """Settings of a body that stands on its feet.
 
-    bounces: whether its motors are heavier to turn than all of it. A foot counts as down if it
-    bears weight, because a foot near the floor need not. Other bodies learn more slowly with that
-    rule.
+    A foot of a body that bounces counts as down if it bears weight, because a foot near the floor
+    need not. Other bodies learn more slowly with that rule.
     """
     fitness: Settings = {"weights": {"foot_speed": WHIPPED}}
     what = "other starts in each generation; small mutations; feet that swing too fast cost"
     why = "of what robots' joints do at random little stands, and much of it whips"
-    if bounces:
+    if body.bounces:
         fitness["contact"] = 0.0
         what += "; feet are down that bear weight"
         why += ": its motors are heavier to turn than all of it"
     return {"fitness": fitness}, (what, "high", why)
 
 
-def many_hinges(
-    bounces: bool, hip: float, length: float, time_step: float
-) -> tuple[Settings, Told]:
-    """Settings of a body that stands on its feet, but in few poses of many; see `manner`."""
-    settings, (what, _, _) = four_feet(bounces)
+def many_hinges(body: Traits) -> tuple[Settings, Told]:
+    """Settings of a body that stands on its feet, but in few poses of many."""
+    settings, (what, _, _) = four_feet(body)
     settings["fitness"]["weights"] |= {"alive": ALIVE, "frequency": HASTY}
-    settings["controller"] = {
-        "interpolation": _unhurried(WalkConfig().speed, hip, length, time_step)
-    }
+    settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
     settings["evolution"] = {"sigma": SMALLER}
     what += f"; smaller ones, no haste; staying up counts {ALIVE:g}"
     why = f"with more than {MANY} hinges for each leg it falls in most poses, and learns to fall ahead"
     return settings, (what, "medium", why)
 
 
-def few_feet(
-    legs: int, hip: float, length: float, mass: float, time_step: float
-) -> tuple[Settings, Told]:
-    """Settings of a body that must step to catch a fall; see `manner`."""
-    hertz = BRISK * length / (STRIDE * hip)
-    calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
+def few_feet(body: Traits) -> tuple[Settings, Told]:
+    """Settings of a body that must step to catch a fall."""
+    hertz = BRISK * body.length / (STRIDE * body.hip)
+    calm = min(WalkConfig().frequency, hertz / stride_limit(body.mass))
     weights = {"alive": ALIVE, "frequency": HASTY}
     fitness: Settings = {"speed": BRISK, "frequency": round(calm, 2), "weights": weights}
     speed = f"{BRISK:g} body lengths/s in strides of {STRIDE:g} hip heights"
-    if legs == 1:
+    if body.legs == 1:
         fitness |= {"speed": LEAPING, "hardening": RISES}
         weights["airborne"] = 0.0
         speed = f"{LEAPING:g} body lengths/s, in the air for free; disturbances that grow"
     settings = {
-        "controller": {"interpolation": _unhurried(BRISK, hip, length, time_step)},
+        "controller": {"interpolation": body.steps_between_poses(BRISK)},
         # An undisturbed trial says little about robustness: evaluate all in all trials.
         "rollout": {"variety": GENERATIONS, "starts": STARTS, "promote": 1.0, "latency": LATE},
         "evolution": {"generations": GENERATIONS, "sigma": SMALLER},
@@ -154,8 +159,3 @@ def few_feet(
     )
     why = "on one foot or two it falls unless it walks: more disturbed starts, and first of all to stay up"
     return settings, (what, "medium", why)
-
-
-def _unhurried(speed: float, hip: float, length: float, time_step: float) -> int:
-    """Steps between poses that avoid too short strides at this speed in body lengths/s."""
-    return unhurried(LEAST * hip / (speed * length), time_step)

@@ -10,7 +10,7 @@ from mjxgait.config.layers import over_base
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import build
 from mjxgait.importer.notes import Notes
-from mjxgait.importer.train_table import manner
+from mjxgait.importer.train_table import Traits, train_table
 
 STEP = 0.005
 
@@ -28,7 +28,7 @@ def told(hip: float = 0.8, length: float = 0.8, **facts: Any) -> tuple[Config, N
         "skeleton": False,
     }
     settled |= facts
-    table = manner(hip=hip, length=length, notes=notes, **settled)
+    table = train_table(Traits(hip=hip, length=length, **settled), notes)
     return build(Config, over_base(table, "the table"), "the table"), notes
 
 
