@@ -119,7 +119,9 @@ class Leg:
         moves, turns = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
         mujoco.mj_jac(self.model, self.data, moves, turns, point, self.body)
         dofs = self.creature.joints.dof_adr[self.joints]
-        tilt = 0.5 * sum(np.cross(turned[:, axis], self.level[:, axis]) for axis in range(3))
+        # Half the sum of the cross products of the columns: written out, it takes a tenth.
+        both = 0.5 * self.level @ turned.T
+        tilt = (both - both.T)[[2, 0, 1], [1, 2, 0]]
         off = np.concatenate([self.counts @ (goal - point) / hip, TURN * tilt])
         return off, np.concatenate([self.counts @ moves[:, dofs] / hip, TURN * turns[:, dofs]])
 

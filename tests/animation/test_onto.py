@@ -82,18 +82,21 @@ class Body:
 
     case: Case
 
-    def poses(self, qpos: np.ndarray, part: str) -> tuple[np.ndarray, np.ndarray]:
-        data = mujoco.MjData(self.case.loop.walk.creature.model)
-        data.qpos[:] = qpos
-        mujoco.mj_kinematics(self.case.loop.walk.creature.model, data)
-        return data.body(part).xpos.copy(), data.body(part).xmat.reshape(3, 3).copy()
+    @cached_property
+    def data(self) -> mujoco.MjData:
+        return mujoco.MjData(self.case.loop.walk.creature.model)
 
-    @property
+    def poses(self, qpos: np.ndarray, part: str) -> tuple[np.ndarray, np.ndarray]:
+        self.data.qpos[:] = qpos
+        mujoco.mj_kinematics(self.case.loop.walk.creature.model, self.data)
+        return self.data.body(part).xpos.copy(), self.data.body(part).xmat.reshape(3, 3).copy()
+
+    @cached_property
     def way(self) -> np.ndarray:
         ahead = np.append(self.case.loop.walk.forward, 0.0)
         return np.stack([np.cross([0.0, 0.0, 1.0], ahead), [0.0, 0.0, 1.0], ahead])
 
-    @property
+    @cached_property
     def unit(self) -> float:
         hips = 0.01 * np.subtract(DOG["Head"][1], DOG["Hips"][1])
         rest = self.case.loop.walk.creature.rest_qpos
