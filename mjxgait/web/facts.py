@@ -1,6 +1,6 @@
 """Numbers that a page needs to simulate a champion itself, as one JSON document.
 
-`assets/simulation.js`, `key_poses.js` and `expressions.js` read it. Names are those of
+The scripts in `assets/` read it. Names are those of
 docs/reference/controller.md; angles in rad, lengths in m.
 """
 
@@ -13,9 +13,11 @@ from mjxgait.certification import CertificateConfig
 from mjxgait.certification.acceptance import how_simulated
 from mjxgait.champion import Champion, serializer_of
 from mjxgait.controllers.key_poses.config import gene_names
+from mjxgait.controllers.sims_brain.reference import TICKS, brain_reference
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import support_extents
 from mjxgait.errors import UserError
+from mjxgait.reference.bodies import Water
 from mjxgait.reference.controllers import reference_of
 from mjxgait.reference.layout import FLOOR, start_frame
 from mjxgait.reference.starts import nominal_starts
@@ -40,7 +42,7 @@ def facts_of(creature: Creature, champion: Champion) -> Facts:
     aims = task.aimed(nominal_starts(creature, 1), CertificateConfig())
     reference = reference_of(creature, champion, float(model.opt.timestep))
     headings = task.commanded_heading(2, 1.0)
-    watched = len(creature.feet.foot_of)
+    watched, light = len(creature.feet.foot_of), aims.light[0]
     return {
         "xml": creature.files["creature.xml"],
         "options": {name: getattr(model.opt, name) for name in OPTIONS},
@@ -52,14 +54,20 @@ def facts_of(creature: Creature, champion: Champion) -> Facts:
         "axes": _lists(forward=frame.forward, left=frame.left, up=frame.up),
         "start": _lists(place=start.place, forward=start.forward, left=start.left),
         "joints": {"qpos": list(creature.joints.qpos), "dofs": list(creature.joints.dofs)},
-        "drive": _drive(creature, champion),
+        "drive": _drive(creature, champion) | {"command": reference.command},
+        "water": _water(model, task.drag) if task.drag else None,
+        "light": light.tolist() if light.any() else None,
         "turn": None if headings is None else float(headings[1]),
         "floor": float(model.geom(FLOOR).pos[2]),
         "goal": float(aims.goal[0]),
         "bar": _bounded(aims.bar[0, 0]),
         "feet": _feet(creature, seen=any(name in FOOT_SENSES for name in reference.reads)),
         "forbidden": _parts(model, creature.feet.seen[watched:]),
-        "fall": {"min_up": fall.min_up, "height": list(fall.height), "touch": fall.touch},
+        "fall": {
+            "min_up": fall.min_up,
+            "height": _bounded(np.array(fall.height)),
+            "touch": fall.touch,
+        },
         "kind": champion.controller,
         "controller": CONTROLLERS[champion.controller](creature, champion),
         "every": reference.every,
@@ -70,7 +78,7 @@ def _check(creature: Creature, champion: Champion) -> None:
     name = creature.name
     if champion.controller not in CONTROLLERS:
         raise UserError(
-            f"{name}: a page with physics runs key poses and expressions, not the controller "
+            f"{name}: a page with physics runs key poses, expressions and brains, not the controller "
             f'"{champion.controller}"; leave --physics out, and the page plays the recorded walk'
         )
     if how_simulated(champion.task).next_goal(np.ones(1), np.ones(1), np.ones(1))[0] > 1:
@@ -182,8 +190,43 @@ def _program(creature: Creature, champion: Champion) -> Facts:
     }
 
 
+def _brain(creature: Creature, champion: Champion) -> Facts:
+    brain = brain_reference(creature, champion, float(creature.model.opt.timestep))
+    kinds = [""] * len(brain.place)
+    for kind, neurons in brain.alike.items():
+        for neuron in neurons:
+            kinds[neuron] = kind
+    return {
+        "kinds": kinds,
+        "tick": brain.pause / TICKS,
+        "column": brain.column.tolist(),
+        "driver": brain.driver.tolist(),
+        "lit": brain.lit.tolist(),
+        "steer": None if brain.steer is None else brain.steer.tolist(),
+        **_lists(weight=brain.weight, gain=brain.gain, strength=brain.strength),
+    }
+
+
+def _water(model: mujoco.MjModel, drag: float) -> Facts:
+    """Blocks with what decides the water's drag on them, N·s/m³."""
+    water = Water(model, drag)
+    return {
+        "drag": drag,
+        "blocks": [
+            {
+                "geom": int(geom),
+                "body": int(body),
+                "root": int(root),
+                "half": model.geom_size[geom].tolist(),
+            }
+            for geom, body, root in zip(water.blocks, water.bodies, water.roots, strict=True)
+        ],
+    }
+
+
 CONTROLLERS: Mapping[str, Callable[[Creature, Champion], Facts]] = {
     "poses": _poses,
     "program": _program,
+    "brain": _brain,
 }
 """Facts of each kind of controller that a page can run."""

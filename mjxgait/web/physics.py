@@ -9,9 +9,13 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+import mujoco
+import numpy as np
+
 from mjxgait.animation.export.bodies import build_bodies, shown_bodies
 from mjxgait.certification import CertificateConfig
 from mjxgait.creature import Creature
+from mjxgait.rendering.painter import seen_geoms
 from mjxgait.rendering.walk import doubt, record_walk
 from mjxgait.training.folder import open_champion
 from mjxgait.web.facts import Facts, facts_of
@@ -23,12 +27,16 @@ SECONDS = 5.0
 CLASSES = {
     "key_poses.js": "KeyPoses",
     "expressions.js": "Expressions",
+    "brain.js": "Brain",
+    "water.js": "Water",
     "simulation.js": "Simulation",
     "view.js": "View",
 }
 """Modules that the page's own script, `physics.js`, uses, and the class of each."""
-FAR, FARTHEST = 2.4, 3.0
-"""Camera distance in units of the creature's size, and the largest in units of that."""
+WIDE, FARTHEST = np.radians(30.0), 3.0
+"""Camera's field of view in rad, and its largest distance in units of the first, from which it
+shows all of the creature.
+"""
 PUSH = 2.0
 """Size of a visitor's push over that of the certificate."""
 EXPORT = "export default loadMujoco;"
@@ -45,22 +53,37 @@ def write_physics_page(run: Path, out: Path, wasm: Path | None = None) -> str:
         file cannot be written.
     """
     creature, champion = open_champion(run)
-    facts = facts_of(creature, champion)
-    said = doubt(run, record_walk(creature, champion, SECONDS))
-    save_page(out, build_physics_page(creature, facts, engine_from(wasm), said))
+    facts, walk = facts_of(creature, champion), record_walk(creature, champion, SECONDS)
+    said = doubt(run, walk)
+    page = build_physics_page(creature, facts, engine_from(wasm), walk.dressed, said)
+    save_page(out, page)
     return said
 
 
-def build_physics_page(creature: Creature, facts: Facts, engine: Engine, said: str = "") -> str:
-    """Return the text of the page. said: the notice of `doubt`; empty if it is certified."""
+def build_physics_page(
+    creature: Creature,
+    facts: Facts,
+    engine: Engine,
+    shown: mujoco.MjModel | None = None,
+    said: str = "",
+) -> str:
+    """Return the text of the page.
+
+    shown: the creature's model with its looks, if it has others. said: the notice of `doubt`;
+    empty if it is certified.
+    """
     web = resources.files("mjxgait.web") / "assets"
+    shown = shown or creature.model
+    height, radius = _extent(shown, creature.stand_qpos)
+    far = radius / np.sin(WIDE / 2)
     extent = float(creature.model.stat.extent)
-    glb, apart = build_bodies(creature)
+    glb, apart = build_bodies(creature, shown)
     speed = CertificateConfig().pushes.speed * PUSH
     page = {
-        "bodies": shown_bodies(creature.model),
+        "bodies": shown_bodies(shown),
         "apart": apart,
         "extent": extent,
+        "water": facts["water"] is not None,
         "push": speed * (creature.gravity * creature.frame.hip_height) ** 0.5,
     }
     lead = (
@@ -80,9 +103,9 @@ def build_physics_page(creature: Creature, facts: Facts, engine: Engine, said: s
         contents=html.escape(contents),
         licence=html.escape((web / "model-viewer.LICENSE").read_text(encoding="utf-8")),
         glb=base64.b64encode(glb).decode("ascii"),
-        target=f"0m {0.6 * creature.frame.stand_pos[2]:.3f}m 0m",
-        far=f"{FAR * extent:.3f}m",
-        farthest=f"{FARTHEST * FAR * extent:.3f}m",
+        target=f"0m {height:.3f}m 0m",
+        far=f"{far:.3f}m",
+        farthest=f"{FARTHEST * far:.3f}m",
         facts=_json(facts),
         page=_json(page),
         # The same bytes on every day and machine.
@@ -92,6 +115,17 @@ def build_physics_page(creature: Creature, facts: Facts, engine: Engine, said: s
         modules="\n".join(_module(web / name, kind) for name, kind in CLASSES.items()),
         code=(web / "physics.js").read_text(encoding="utf-8"),
     )
+
+
+def _extent(model: mujoco.MjModel, qpos: np.ndarray) -> tuple[float, float]:
+    """Height of a body's middle, and radius of a ball about it in which all of it is, in m."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    seen = [geom for geom in seen_geoms(model) if model.geom_bodyid[geom]]
+    places, radii = data.geom_xpos[seen], model.geom_rbound[seen][:, None]
+    low, high = (places - radii).min(0), (places + radii).max(0)
+    return float((low + high)[2] / 2), float(np.linalg.norm(high - low) / 2)
 
 
 def _module(file: Traversable, kind: str) -> str:

@@ -10,6 +10,7 @@ import json
 import pytest
 from helpers import said_by
 from rendering.made_up import falling, treading, write_run
+from web.brains import with_a_brain
 from web.browser import drawn, wait_until, watched_tab
 from web.engine import engine_folder
 
@@ -91,7 +92,7 @@ def test_it_says_that_the_creature_fell(tab):
 
 def test_the_pointer_pulls_the_creature_but_not_the_floor(tab):
     box = tab.locator("#walk").bounding_box()
-    seat = box["x"] + box["width"] / 2, box["y"] + 0.36 * box["height"]
+    seat = box["x"] + box["width"] / 2, box["y"] + 0.49 * box["height"]
     orbit = tab.evaluate("walk.getCameraOrbit().theta")
     tab.mouse.move(*seat)
     tab.mouse.down()
@@ -130,10 +131,28 @@ def test_it_fits_a_phone_and_answers_a_finger(browser, page, tab):
     tab.close()
 
 
+def test_a_swimmer_has_a_light_and_no_floor(browser, tmp_path):
+    body, champion = with_a_brain("follow")
+    engine, file = engine_from(engine_folder()), tmp_path / "swimmer.html"
+    file.write_text(build_physics_page(body, facts_of(body, champion), engine), encoding="utf-8")
+    tab, wrong, _ = watched_tab(browser, file.as_uri())
+    wait_until(tab, STARTED)
+    assert not tab.is_visible("#uphill")
+    assert tab.is_visible("#mass")
+    light = "['cx', 'cy'].map(k => document.querySelector('circle.light').getAttribute(k)).join()"
+    before, apart = tab.evaluate(light), shown(tab)["apart"]
+    assert apart > 5.0
+    tab.keyboard.press("l")
+    wait_until(tab, f"{light} !== '{before}'")
+    assert shown(tab)["apart"] == pytest.approx(apart, abs=0.5)
+    assert wrong == []
+    tab.close()
+
+
 def test_a_controller_or_ground_that_a_page_cannot_run_is_refused(stool):
     champion = treading(stool)
     other = dataclasses.replace(champion, controller="sims")
-    with pytest.raises(UserError, match=r'expressions, not the controller "sims"'):
+    with pytest.raises(UserError, match=r'expressions and brains, not the controller "sims"'):
         facts_of(stool, other)
     with pytest.raises(UserError, match=r'those of "travel" move on'):
         facts_of(stool, dataclasses.replace(champion, task="travel"))

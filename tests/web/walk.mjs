@@ -7,11 +7,15 @@ const of = async file => import(pathToFileURL(file));
 const mujoco = await (await of(`${engine}/mujoco.js`)).default();
 const { KeyPoses } = await of(`${assets}/key_poses.js`);
 const { Expressions } = await of(`${assets}/expressions.js`);
+const { Brain } = await of(`${assets}/brain.js`);
+const { Water } = await of(`${assets}/water.js`);
 const { Simulation } = await of(`${assets}/simulation.js`);
-const CONTROLLERS = { poses: KeyPoses, program: Expressions };
+const CONTROLLERS = { poses: KeyPoses, program: Expressions, brain: Brain };
 
 function walk({ facts, steps, disturbed, push }) {
-  const simulation = new Simulation(mujoco, facts, new CONTROLLERS[facts.kind](facts.controller));
+  const controller = new CONTROLLERS[facts.kind](facts.controller);
+  const water = facts.water && new Water(facts.water);
+  const simulation = new Simulation(mujoco, facts, controller, water);
   if (disturbed) {
     simulation.setMass(disturbed.mass);
     simulation.setFriction(disturbed.friction);

@@ -22,9 +22,11 @@ def shown_bodies(model: mujoco.MjModel) -> list[int]:
     return sorted({int(model.geom_bodyid[g]) for g in seen_geoms(model)} - {0})
 
 
-def build_bodies(creature: Creature) -> tuple[bytes, float]:
-    """Return the bytes of the file in the standing pose, and the distance of two tiles in m."""
-    model = creature.model
+def build_bodies(creature: Creature, model: mujoco.MjModel) -> tuple[bytes, float]:
+    """Return the bytes of the file in the standing pose, and the distance of two tiles in m.
+
+    model: the creature's, with the looks that the file has.
+    """
     document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
     document.scenes, document.scene = [gltf.Scene(name=creature.name, nodes=[0])], 0
     buffer = Buffer(document)

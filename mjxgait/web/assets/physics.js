@@ -1,8 +1,8 @@
 // The page with physics: loads MuJoCo, keeps real time, and lets a visitor disturb the creature.
 //
 // Scripts before it define these.
-const { KeyPoses, Expressions, Simulation, View, loadMujoco } = globalThis;
-const CONTROLLERS = { poses: KeyPoses, program: Expressions };
+const { KeyPoses, Expressions, Brain, Water, Simulation, View, loadMujoco } = globalThis;
+const CONTROLLERS = { poses: KeyPoses, program: Expressions, brain: Brain };
 
 const element = id => document.getElementById(id);
 const json = id => JSON.parse(element(id).textContent);
@@ -26,9 +26,9 @@ async function start() {
   const [facts, page] = [json("facts"), json("page")];
   const mujoco = await loadMujoco({ wasmBinary: await unpacked("engine") });
   const controller = new CONTROLLERS[facts.kind](facts.controller);
-  const simulation = new Simulation(mujoco, facts, controller);
-  // Expressions have no cycle whose speed could change.
-  element("pace").closest("label").hidden = facts.kind !== "poses";
+  const water = facts.water && new Water(facts.water);
+  const simulation = new Simulation(mujoco, facts, controller, water);
+  showControls(facts);
   const view = new View(viewer, element("overlay"), page);
   const state = {
     paused: false,
@@ -46,6 +46,17 @@ async function start() {
   connectKeys(parts);
   said.textContent = "";
   run(parts);
+}
+
+// Only key poses have a cycle whose speed could change; in water there is no floor.
+function showControls({ kind, water, light }) {
+  const hide = (id, hidden) => {
+    element(id).closest("label").hidden = hidden;
+  };
+  hide("pace", kind !== "poses");
+  for (const id of ["uphill", "aside", "friction"]) hide(id, water !== null);
+  for (const part of document.querySelectorAll(".lit")) part.hidden = light === null;
+  document.body.classList.toggle("water", water !== null);
 }
 
 // Real time, with an accumulator. A machine that is too slow slows the creature down, not the page.
@@ -105,6 +116,7 @@ function drawLines(simulation, view, state) {
     { xpos } = simulation.data;
   if (shove && simulation.time - shove.time > 0.4) state.shove = null;
   const tip = [...xpos.slice(3 * trunk, 3 * trunk + 3)];
+  view.spot("light", simulation.lightPlace());
   view.line("shove", state.shove && [tip.map((value, i) => value - (shove.way[i] ?? 0)), tip]);
 }
 
@@ -134,6 +146,7 @@ function tell(simulation, state, shown, page) {
     lies,
     paused: state.paused,
     pulled: Boolean(simulation.pull),
+    apart: simulation.lightDistance(),
     frames: real > 0 ? (shown.length - 1) / real : 0,
     stepped: sum("computing") / Math.max(1, sum("steps")),
   });
@@ -153,6 +166,9 @@ const actions = {
     state.follow = !state.follow;
     if (state.follow) view.recentre();
     element("follow").setAttribute("aria-pressed", String(state.follow));
+  },
+  light({ simulation }) {
+    simulation.turnLight(Math.PI / 2);
   },
   defaults() {
     for (const slider of document.querySelectorAll("#sliders input")) {
@@ -262,7 +278,7 @@ function connectPointer({ simulation, view, state }) {
 }
 
 function connectKeys(parts) {
-  const keys = { " ": "pause", r: "restart", f: "follow" };
+  const keys = { " ": "pause", r: "restart", f: "follow", l: "light" };
   addEventListener(
     "keydown",
     event => {

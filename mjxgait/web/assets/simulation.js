@@ -22,9 +22,10 @@ const BLOWN_UP = 1e4;
 const CONTACT_GAP = 0.002;
 
 export class Simulation {
-  // facts: of mjxgait/web/facts.py. controller: has `init` and `act`, as in key_poses.js.
-  constructor(mujoco, facts, controller) {
-    Object.assign(this, { mujoco, facts, controller });
+  // facts: of mjxgait/web/facts.py. controller: has `init` and `act`, as in key_poses.js. water: has
+  // `press`, as in water.js; null on land.
+  constructor(mujoco, facts, controller, water = null) {
+    Object.assign(this, { mujoco, facts, controller, water });
     this.model = mujoco.MjModel.from_xml_string(facts.xml);
     for (const [name, value] of Object.entries(facts.options)) this.model.opt[name] = value;
     this.data = new mujoco.MjData(this.model);
@@ -42,6 +43,7 @@ export class Simulation {
         this.entries.push([row, M_colind[this.entries.length]]);
     this.pace = 1;
     this.turn = facts.turn;
+    this.light = facts.light;
     this.pull = null;
     this.reset();
   }
@@ -117,6 +119,8 @@ export class Simulation {
     facts.joints.dofs.forEach((dof, j) => {
       applied[dof] = torque[j];
     });
+    data.xfrc_applied.fill(0);
+    this.water?.press(data);
     this.applyPull();
     mujoco.mj_step2(model, data);
     this.forces.set(data.qfrc_constraint);
@@ -182,8 +186,11 @@ export class Simulation {
       [0, 1, 2].map(
         axis => geoms.reduce((sum, { geom }) => sum + geom_xpos[3 * geom + axis], 0) / geoms.length,
       );
-    const foot_height = feet.parts.map(geoms => Math.min(...geoms.map(one => this.height(one))));
+    const foot_height = feet.parts.map(geoms =>
+      this.water ? Infinity : Math.min(...geoms.map(one => this.height(one))),
+    );
     return {
+      light: feet.parts.flat().map(({ geom }) => this.towardsLight(geom)),
       foot_height,
       contact: foot_height.map(height => (height < CONTACT_GAP ? 1 : 0)),
       foot_place: feet.parts.map(geoms => {
@@ -192,6 +199,39 @@ export class Simulation {
       }),
       nose_vel: [dot(velocity, nose), dot(velocity, beside)],
     };
+  }
+
+  // The light's place [3] in the world; null in the dark.
+  lightPlace() {
+    return this.light && this.light.map((value, i) => this.facts.start.place[i] + value);
+  }
+
+  // Distance in m of the trunk from the light; null in the dark.
+  lightDistance() {
+    const place = three(this.data.xpos, this.facts.trunk);
+    return this.light && Math.hypot(...minus(this.lightPlace(), place));
+  }
+
+  // Turn the light about the creature, to the left by an angle in rad.
+  turnLight(angle) {
+    if (!this.light) return;
+    const place = three(this.data.xpos, this.facts.trunk),
+      [x, y] = minus(this.lightPlace(), place),
+      [cos, sin] = [Math.cos(angle), Math.sin(angle)],
+      moved = [cos * x - sin * y - x, sin * x + cos * y - y, 0];
+    this.light = this.light.map((value, i) => value + moved[i]);
+  }
+
+  // Direction [3] of the light in a geom's own axes; zero in the dark.
+  towardsLight(geom) {
+    const { data } = this;
+    if (!this.light) return [0, 0, 0];
+    const there = minus(this.lightPlace(), three(data.geom_xpos, geom)),
+      far = Math.max(Math.hypot(...there), 1e-9),
+      rot = data.geom_xmat.slice(9 * geom, 9 * geom + 9);
+    return [0, 1, 2].map(
+      column => dot([rot[column], rot[3 + column], rot[6 + column]], there) / far,
+    );
   }
 
   // Height of a geom's lowest point above the floor: the sum of a sphere, a box and an ellipsoid.
@@ -203,11 +243,12 @@ export class Simulation {
     return geom_xpos[3 * geom + 2] - reach - this.facts.floor;
   }
 
-  // Joint torques [J] by stable PD (Tan, Liu & Turk 2011) or plain PD.
+  // Joint torques [J]: the target itself, or by stable PD (Tan, Liu & Turk 2011) or plain PD.
   torque(target) {
     const { data, facts } = this,
-      { kp, kd, limit, law } = facts.drive,
+      { kp, kd, limit, law, command } = facts.drive,
       { dofs, qpos } = facts.joints;
+    if (command === "torque") return target.map((value, j) => clip(value, -limit[j], limit[j]));
     const h = law === "pd" ? 0 : facts.step;
     const wanted = dofs.map(
       (dof, j) =>
@@ -251,8 +292,7 @@ export class Simulation {
 
   // The visitor's spring, and a damper, from a point of a body to a place in the world.
   applyPull() {
-    const { data, pull } = this,
-      applied = data.xfrc_applied.fill(0);
+    const { data, pull } = this;
     if (!pull) return;
     const { body, target, stiffness, damping, most } = pull,
       point = this.pulledPoint();
@@ -269,7 +309,10 @@ export class Simulation {
     force.forEach((value, i) => {
       force[i] = share * value;
     });
-    applied.set([...force, ...cross(minus(point, three(data.xipos, body)), force)], 6 * body);
+    const moment = cross(minus(point, three(data.xipos, body)), force);
+    [...force, ...moment].forEach((value, i) => {
+      data.xfrc_applied[6 * body + i] += value;
+    });
   }
 
   // The place in the world at which the visitor holds a body.

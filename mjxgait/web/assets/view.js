@@ -10,6 +10,9 @@ const NEAR = [
   ]),
 ];
 
+// Share of the picture within which spots are drawn.
+const EDGE = 0.94;
+
 export class View {
   // facts: `page` of mjxgait/web/physics.py.
   constructor(viewer, overlay, facts) {
@@ -30,6 +33,7 @@ export class View {
     const { scene, facts, floor, camera } = this,
       { shadow } = scene,
       reach = facts.extent;
+    floor.visible = !facts.water;
     const dark = matchMedia("(prefers-color-scheme: dark)").matches;
     floor.traverse(part => {
       part.layers.set(1);
@@ -41,6 +45,7 @@ export class View {
     scene.boundingBox.getSize(scene.size);
     shadow.setScene(scene, scene.shadowSoftness, "bottom");
     this.ground.add(shadow);
+    shadow.visible = !facts.water;
   }
 
   // Draw the present state. follow: whether the camera goes along. seconds: since the last drawing.
@@ -133,5 +138,18 @@ export class View {
     if (!ends) return;
     const [[x1, y1], [x2, y2]] = ends.map(end => this.pixel(end));
     for (const [key, value] of Object.entries({ x1, y1, x2, y2 })) line.setAttribute(key, value);
+  }
+  // Draw a spot at a point, or none; at the edge if the point is out of view. Its class is its look.
+  spot(name, point) {
+    const spot = this.overlay.querySelector(`circle.${name}`);
+    spot.style.visibility = point ? "visible" : "hidden";
+    if (!point) return;
+    const seen = this.world.localToWorld(this.vector(...point)).project(this.camera);
+    // Behind the camera, everything is seen upside down.
+    const way = seen.z > 1 ? [-seen.x, -seen.y] : [seen.x, seen.y];
+    const far = Math.max(...way.map(Math.abs)),
+      share = seen.z > 1 || far > EDGE ? EDGE / far : 1;
+    spot.setAttribute("cx", ((share * way[0] + 1) / 2) * this.viewer.clientWidth);
+    spot.setAttribute("cy", ((1 - share * way[1]) / 2) * this.viewer.clientHeight);
   }
 }

@@ -1,0 +1,69 @@
+// The water's drag on blocks, written from docs/reference/modular-bodies.md.
+//
+// For the page of `mjxgait share --physics`. Each face has nine points; the force at one is along
+// its normal, against its velocity along that.
+
+const PLACES = [-Math.sqrt(0.6), 0, Math.sqrt(0.6)];
+const SHARES = [5 / 18, 8 / 18, 5 / 18];
+const three = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1],
+  a[2] * b[0] - a[0] * b[2],
+  a[0] * b[1] - a[1] * b[0],
+];
+
+export class Water {
+  // facts: `water` of mjxgait/web/facts.py: drag in N·s/m³; blocks: geom, body, root, and half sizes.
+  constructor({ drag, blocks }) {
+    this.drag = drag;
+    this.blocks = blocks.map(block => ({ ...block, points: pointsOf(block.half) }));
+  }
+
+  // Add the forces to MuJoCo's `xfrc_applied`.
+  press(data) {
+    for (const { geom, body, root, points } of this.blocks) {
+      const rot = data.geom_xmat.slice(9 * geom, 9 * geom + 9),
+        middle = three(data.geom_xpos, geom),
+        heavy = three(data.xipos, body),
+        whole = three(data.subtree_com, root);
+      const [spin, shift] = [three(data.cvel, 2 * body), three(data.cvel, 2 * body + 1)];
+      for (const { place, axis, side, area } of points) {
+        const point = middle.map((value, i) => value + dot(three(rot, i), place));
+        const normal = [0, 1, 2].map(i => side * rot[3 * i + axis]);
+        const carried = cross(
+          spin,
+          point.map((value, i) => value - whole[i]),
+        );
+        const along = dot(
+          shift.map((value, i) => value + carried[i]),
+          normal,
+        );
+        const force = normal.map(value => -this.drag * area * along * value);
+        const moment = cross(
+          point.map((value, i) => value - heavy[i]),
+          force,
+        );
+        [...force, ...moment].forEach((value, i) => {
+          data.xfrc_applied[6 * body + i] += value;
+        });
+      }
+    }
+  }
+}
+
+// Points of a block's faces, each with the axis and side of its face, and its share of the area.
+function pointsOf(half) {
+  const points = [];
+  for (const axis of [0, 1, 2])
+    for (const side of [-1, 1])
+      PLACES.forEach((u, n) =>
+        PLACES.forEach((v, m) => {
+          const [i, j] = [(axis + 1) % 3, (axis + 2) % 3],
+            place = [0, 0, 0];
+          [place[axis], place[i], place[j]] = [side * half[axis], u * half[i], v * half[j]];
+          points.push({ place, axis, side, area: 4 * half[i] * half[j] * SHARES[n] * SHARES[m] });
+        }),
+      );
+  return points;
+}
