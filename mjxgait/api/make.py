@@ -194,7 +194,7 @@ def refine(
     table = read_toml(Path(names)) if isinstance(names, str | Path) else names
     tell: Callable[[str], object] = (lambda said: None) if quiet else print
     brought = bring(creature, source, table, (begin, end), np.radians(tolerance), forward, tell)
-    chosen = near.refining(base, brought, keep)
+    chosen = near.refining(creature, base, brought, keep)
     folder = check_run(Path(out) if out else None, creature, chosen)
     begins = partial(near.begin, folder, creature, chosen, source, brought)
     return _evolved(folder, creature, chosen, quiet, begins, on_generation=on_generation)

@@ -93,7 +93,7 @@ def refine_command(arguments: Sequence[str]) -> int:
         options.forward,
         (lambda said: None) if quiet else print,
     )
-    configs = [refining(base, brought, keep) for keep in options.keep]
+    configs = [refining(creature, base, brought, keep) for keep in options.keep]
     if options.only_show:
         return 0
     if len(configs) == 1:

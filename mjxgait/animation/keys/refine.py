@@ -16,6 +16,7 @@ from mjxgait.animation.keys.cycle import interpolated
 from mjxgait.certification import criteria_of, read_certificate, verdict_of
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import Table, build, merge
+from mjxgait.controllers.key_poses.config import smooth
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.files import read_json, write_text
@@ -84,7 +85,7 @@ def base_settings(
     return chosen
 
 
-def refining(config: Config, brought: Brought, keep: float) -> Config:
+def refining(creature: Creature, config: Config, brought: Brought, keep: float) -> Config:
     """The settings of a run near a cycle; a clock leads it in the cycle's own time.
 
     keep: with 1 only the reflexes (steering, balance) evolve; with 0 every joint, by `FARTHEST`.
@@ -110,6 +111,10 @@ def refining(config: Config, brought: Brought, keep: float) -> Config:
         near["advance"] = own.advance
         near["tuning"] = {n: _near(own.tuning[n], ranges[n], 1.0 - keep) for n in own.tuning}
         spread = min(spread, OWN_SPREAD)
+    if near["advance"] == "clock":
+        whole = len(poses) * (1 + brought.cycle.mirrored)
+        step = float(creature.model.opt.timestep)
+        near["interpolation"] = smooth(period * (1.0 + slack), whole, step)
     changes = {"controller": near, "evolution": {"initial_spread": spread}}
     return build(type(config), merge(dataclasses.asdict(config), changes), "the settings of refine")
 

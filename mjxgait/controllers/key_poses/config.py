@@ -1,6 +1,7 @@
 """Settings of the key-pose controller and of the drive."""
 
 import dataclasses
+import math
 from typing import Annotated, Literal
 
 import pydantic
@@ -159,3 +160,12 @@ class DriveConfig:
     constraint_forces: bool = False
     stiffness: Positive = 1.0
     damping: Positive = 1.0
+
+
+def smooth(period: float, poses: int, time_step: float) -> int:
+    """Return the steps between poses with which a clock moves the target in every control step.
+
+    With fewer the target stands still and jumps, which shakes the feet.
+    period: s of the longest cycle. poses: of the whole cycle.
+    """
+    return max(math.ceil(period / (poses * time_step)), 1)

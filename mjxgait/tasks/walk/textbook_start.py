@@ -1,6 +1,7 @@
 """Settings that start evolution near a textbook cycle, drawn after an animal's."""
 
 from mjxgait.config.schema import Config
+from mjxgait.controllers.key_poses.config import smooth
 from mjxgait.creature import Creature
 from mjxgait.creature.textbook import Footfalls, textbook_cycle
 from mjxgait.tasks.walk.config import WalkConfig
@@ -70,11 +71,13 @@ def drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[s
     )
     cycle = textbook_cycle(creature, falls, DRAWN)
     poses = cycle[: DRAWN // 2] if creature.mirror.symmetric else cycle
+    slow, time_step = (1 + SLACK) * stride / speed, float(creature.model.opt.timestep)
     near = {
         "key_poses": len(poses),
         "advance": "clock",
+        "interpolation": smooth(slow, DRAWN, time_step),
         "around": [round(float(angle), 6) for angle in poses.ravel()],
         "within": WITHIN,
-        "tuning": {"period": [(1 - SLACK) * stride / speed, (1 + SLACK) * stride / speed]},
+        "tuning": {"period": [(1 - SLACK) * stride / speed, slow]},
     }
     return {"controller": near, "evolution": {"initial_spread": BEGINS}}

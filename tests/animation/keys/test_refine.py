@@ -56,7 +56,7 @@ def brought(stool: Creature, tmp_path_factory) -> Brought:
 
 @pytest.mark.parametrize(("keep", "within"), [(1.0, 0.0), (0.5, 15.0), (0.0, 30.0)])
 def test_poses_stay_within_the_range_set_by_keep(stool, brought, keep: float, within: float):
-    config = refining(small_config(), brought, keep).controller
+    config = refining(stool, small_config(), brought, keep).controller
     low, high = PoseTracker(stool, 0.005).bounds(config)
     drawn = brought.fit.key_poses
     assert config.key_poses == len(drawn)
@@ -66,10 +66,12 @@ def test_poses_stay_within_the_range_set_by_keep(stool, brought, keep: float, wi
     assert (high.key_poses <= stool.joints.pose_high + 1e-6).all()
     slower = config.tuning.period[1] / brought.cycle.period
     assert slower == pytest.approx(1.0 + 0.3 * (1.0 - keep))
+    positions = len(brought.fit.key_poses) * (1 + brought.cycle.mirrored) * config.interpolation
+    assert positions * stool.model.opt.timestep >= config.tuning.period[1], "the target never waits"
 
 
 def test_the_first_individual_is_the_drawn_cycle(stool, brought):
-    config = refining(small_config(), brought, 0.5).controller
+    config = refining(stool, small_config(), brought, 0.5).controller
     variation = PoseTracker(stool, 0.005).variation(config, EvolutionConfig())
     made = variation.create(key_of(0), 4)
     assert made.key_poses[0] == pytest.approx(brought.fit.key_poses, abs=1e-5)
@@ -80,18 +82,18 @@ def test_a_walk_with_known_genes_starts_close_to_them(stool, brought):
     """It has walked already; a cycle that was never simulated needs a wider search."""
     own = Own(brought.fit, brought.cycle, 0.0, "error", dict.fromkeys(TUNING, 0.0))
     usual, close = (
-        refining(small_config(), each, 0.5).evolution.initial_spread
+        refining(stool, small_config(), each, 0.5).evolution.initial_spread
         for each in (brought, dataclasses.replace(brought, own=own))
     )
     assert usual == EvolutionConfig().initial_spread
     assert close == 0.2
     still_closer = small_config(evolution={"initial_spread": 0.1})
     known = dataclasses.replace(brought, own=own)
-    assert refining(still_closer, known, 0.5).evolution.initial_spread == 0.1
+    assert refining(stool, still_closer, known, 0.5).evolution.initial_spread == 0.1
 
 
-def test_settings_of_another_creature_are_refused(shipped, brought):
-    config = refining(small_config(), brought, 0.5)
+def test_settings_of_another_creature_are_refused(shipped, stool, brought):
+    config = refining(stool, small_config(), brought, 0.5)
     if shipped.settings.creature.grows:
         pytest.skip("it has no poses")
     with pytest.raises(UserError, match=r"controller\.around has"):
@@ -99,9 +101,9 @@ def test_settings_of_another_creature_are_refused(shipped, brought):
 
 
 @pytest.mark.parametrize("keep", [-0.1, 1.5])
-def test_keep_lies_between_0_and_1(brought, keep: float):
+def test_keep_lies_between_0_and_1(stool, brought, keep: float):
     with pytest.raises(UserError, match="between 0 and 1"):
-        refining(small_config(), brought, keep)
+        refining(stool, small_config(), brought, keep)
 
 
 def test_a_changed_reach_of_a_foot_is_described_in_words(stool: Creature):
@@ -215,7 +217,7 @@ def test_runs_with_several_keep_values_make_one_picture(
 ):
     out = tmp_path / "all"
     for keep in (0.0, 1.0):
-        config = refining(small_config(), brought, keep)
+        config = refining(stool, small_config(), brought, keep)
         begin(refine.folder_of(out, keep), stool, config, Path("x.csv"), brought)
     monkeypatch.setattr(refine, "LOOP_SECONDS", 2.0)
     faithful, free = refine.runs_in(out)

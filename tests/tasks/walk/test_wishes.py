@@ -464,6 +464,9 @@ def test_natural_starts_from_a_drawn_cycle_at_an_animals_period(body: Creature):
     for config, speed in ((slow, 0.2), (fast, 1.0)):
         low, high = config.tuning.period
         assert low < animal_stride(speed, hip) / speed < high
+        poses = config.key_poses * (1 + body.mirror.symmetric)
+        positions = poses * config.interpolation
+        assert high <= positions * body.model.opt.timestep < high + poses * body.model.opt.timestep
     assert with_targets(Config(), body, WalkTargets(speed="0.2")).controller.around == slow.around
     # A controller without poses has no poses to start from.
     other = dataclasses.replace(Config(), use=UseConfig("program", "walk"))
