@@ -18,6 +18,7 @@ from mjxgait.importer.balance import steady_balance
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.bones import add_bones
 from mjxgait.importer.clean import clean_mjcf, clean_urdf
+from mjxgait.importer.drive import step_if_narrow
 from mjxgait.importer.find import find_anatomy
 from mjxgait.importer.notes import Notes, listed, one_line, plain_names, tell_dropped, tell_left_out
 from mjxgait.importer.orient import (
@@ -162,6 +163,8 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     steady_balance(
         best.drive, best.kinematics.names, best.kinematics.model, best.qpos, soles, best.notes
     )
+    if source.bones and not planar:
+        step_if_narrow(best.kinematics, best.q, best.drive, best.notes)
     name = (
         plain_names([choices.name or path.stem.removesuffix(".urdf")], ["creature"])[0].strip(".-")
         or "creature"
@@ -319,7 +322,7 @@ def _train(best: Candidate, symmetric: bool, hip: float, length: float, skeleton
     """Return the table `[train]`. hip, length: m, of the hip height and the body."""
     body = best.kinematics
     traits = Traits(
-        steps=bool(best.drive.ahead or best.drive.aside),
+        steps=best.drive.must_step,
         legs=len(body.feet),
         hinges=len(body.joints),
         symmetric=symmetric,

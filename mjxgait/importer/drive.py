@@ -11,6 +11,7 @@ import numpy as np
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.notes import Notes, listed
 from mjxgait.importer.soles import Stance
+from mjxgait.importer.stance import stance_of
 
 GRAVITY = 9.81
 STIFFNESS, LEAST_STIFFNESS, MOST_STIFFNESS = 12.0, 2.5, 6.0
@@ -50,6 +51,10 @@ flails. One-legged bodies use the full range.
 """
 SWINGING = 2
 """Joints of a leg that swing it widely."""
+NARROW = 0.28
+"""Half the distance of left and right feet, in hip heights, below which a character on more feet
+also places its feet under a fall: it tips over its legs before a stride ends.
+"""
 STEPPERS, APART = 2, 0.5
 """Most feet of a body that must step to catch a fall.
 
@@ -86,6 +91,7 @@ class Drive:
     ahead: dict[str, float] = dataclasses.field(default_factory=dict)
     aside: dict[str, float] = dataclasses.field(default_factory=dict)
     turn: dict[str, float] = dataclasses.field(default_factory=dict)
+    must_step: bool = False
 
 
 def plan_drive(
@@ -133,9 +139,26 @@ def plan_drive(
     if not planar:
         _steering(kinematics, stance, drive, moves)
     _balance(kinematics, stance, drive, moves, planar)
-    if _must_step(kinematics, stance):
+    drive.must_step = _must_step(kinematics, stance)
+    if drive.must_step:
         _stepping(kinematics, stance, drive, moves, planar)
     return drive
+
+
+def step_if_narrow(kinematics: KinematicModel, q: np.ndarray, drive: Drive, notes: Notes) -> None:
+    """Set the stepping weights of a body that stands, in a pose [J], if its feet are close."""
+    stance = stance_of(kinematics, q)
+    sides = [kinematics.data.xpos[group[0] + 1][1] for group in kinematics.feet]
+    track = float(np.abs(sides).mean()) / stance.hip
+    if drive.must_step or track > NARROW:
+        return
+    _stepping(kinematics, stance, drive, _roles(kinematics, q, stance)[1], planar=False)
+    notes.guess(
+        "stepping",
+        "feet land under a fall",
+        "medium",
+        f"left and right feet are {2 * track:.2f} hip heights apart: it tips over its legs",
+    )
 
 
 def _own_inertia(kinematics: KinematicModel) -> np.ndarray:

@@ -122,7 +122,7 @@ def _corrections(drive: Drive) -> list[str]:
     ]
     if drive.ahead or drive.aside:
         lines += [
-            "[stepping]  # low: likewise; two feet and less must step under a fall",
+            "[stepping]  # low: likewise; two feet and less, and narrow bodies, step under a fall",
             f"ahead = {_table(drive.ahead)}",
             f"aside = {_table(drive.aside)}",
             f"turn = {_table(drive.turn)}",

@@ -170,3 +170,24 @@ def test_a_character_on_four_feet_walks_as_an_animal(tmp_path: Path):
     assert (usual.controller, usual.evolution) == (asked.controller, asked.evolution)
     assert usual.fitness.wish.gait == "walk"
     assert configured(creature, None, {}, WalkTargets(gait="auto")).fitness.wish.gait == "auto"
+
+
+@pytest.mark.parametrize(("times", "narrow"), [(0.8, True), (3.0, False)])
+def test_a_narrow_character_steps_under_a_fall(tmp_path: Path, times: float, narrow: bool):
+    """Its feet land where it falls, but it stands, so it is evolved like others on four feet."""
+
+    def at(point: tuple[float, float, float] | None):
+        return point and (times * point[0], *point[1:])
+
+    dog = {name: (parent, at(place), at(end)) for name, (parent, place, end) in DOG.items()}
+    file = tmp_path / "dog.bvh"
+    file.write_text(bvh(dog))
+    made = import_model(file, ImportChoices(apart=False))
+    creature = load_files(made.files)
+    assert (np.abs(creature.feet.places[:, 1]).mean() < 0.28 * creature.frame.hip_height) == narrow
+    assert creature.corrections.steps == narrow
+    assert ("feet land under a fall" in made.notes.text()) == narrow
+    assert creature.settings.train["fitness"]["weights"]["patter"] > 0
+    if narrow:
+        weights = creature.corrections.stepping
+        assert (np.abs(weights.aside) > 0).sum() == (np.abs(weights.ahead) > 0).sum() == 4
