@@ -87,7 +87,10 @@ def test_a_body_that_no_file_has_is_refused(dog: tuple[Path, WalkLoop], stool: C
 
     assert "was not made of a character's skeleton" in refused(of(stool), file)
     text = creature.files["creature.toml"]
-    old = text[: text.index("[rig]")] + text[text.index("[steering]") :]
+    rig, after, step, end = (
+        text.index(f"[{table}]") for table in ("rig", "steering", "stepping", "termination")
+    )
+    old = text[:rig] + text[after:step] + text[end:]  # it had none of these tables
     earlier = load_files({**creature.files, "creature.toml": old})
     assert "import the character again" in refused(of(earlier), file)
     longer = scaled(creature, {"LeftShin": 1.5, "RightShin": 1.5})

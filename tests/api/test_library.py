@@ -17,6 +17,7 @@ from mjxgait.creature.scale import scaled
 from mjxgait.errors import UserError
 from mjxgait.output import LOG
 from mjxgait.training.experiment import build_experiment
+from mjxgait.training.loop import _COMPILED
 
 SMALL = {
     "rollout": {"seconds": 0.4, "starts": 2, "promote": 1.0, "lanes": 4},
@@ -51,6 +52,7 @@ def run(tmp_path_factory, lines: list[dict], records: list[logging.LogRecord]) -
     LOG.addHandler(handler)
     LOG.setLevel(logging.DEBUG)
     try:
+        _COMPILED.clear()  # of other tests in this process
         return mjxgait.train(
             STOOL,
             out=folder,
