@@ -302,19 +302,18 @@ def _stepping(
     The highest upright joint turns it.
     """
     for f in range(len(kinematics.feet)):
-        for role, axis, table in (("stride", 0, drive.ahead), ("side", 1, drive.aside)):
-            if role == "side" and planar:
-                continue
-            way = {j: float(moves[j][axis]) / stance.hip for j in kinematics.leg(f)}
-            own = [j for j in way if drive.role[j] == role and abs(way[j]) > WEAKEST]
-            if own:
-                table[kinematics.names[own[0]]] = round(1 / way[own[0]], 3)
         shared = {
             j for other in range(len(kinematics.feet)) if other != f for j in kinematics.leg(other)
         }
-        upright = {
-            j: float(kinematics.data.xaxis[j + 1][2]) for j in kinematics.leg(f) if j not in shared
-        }
+        leg = [j for j in kinematics.leg(f) if j not in shared]
+        for role, axis, table in (("stride", 0, drive.ahead), ("side", 1, drive.aside)):
+            if role == "side" and planar:
+                continue
+            way = {j: float(moves[j][axis]) / stance.hip for j in leg}
+            own = [j for j in way if drive.role[j] == role and abs(way[j]) > WEAKEST]
+            if own:
+                table[kinematics.names[own[0]]] = round(1 / way[own[0]], 3)
+        upright = {j: float(kinematics.data.xaxis[j + 1][2]) for j in leg}
         if turns := [j for j in upright if abs(upright[j]) > UPRIGHT]:
             drive.turn[kinematics.names[turns[0]]] = float(np.sign(upright[turns[0]]))
 
