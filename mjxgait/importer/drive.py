@@ -76,7 +76,7 @@ class Drive:
     """Joint roles, gains, torque limits and ranges, and the weights of steering and balance.
 
     role: of each joint. kp, kd, torque: [J]. ranges: [J, 2] deg. The dicts map joint names to
-    weights (docs/reference/controller.md).
+    weights (docs/reference/controller.md). must_step: whether it stands on one foot in each step.
     """
 
     role: list[str]

@@ -213,13 +213,8 @@ def _water(model: mujoco.MjModel, drag: float) -> Facts:
     return {
         "drag": drag,
         "blocks": [
-            {
-                "geom": int(geom),
-                "body": int(body),
-                "root": int(root),
-                "half": model.geom_size[geom].tolist(),
-            }
-            for geom, body, root in zip(water.blocks, water.bodies, water.roots, strict=True)
+            {"geom": int(geom), "body": int(body), "half": model.geom_size[geom].tolist()}
+            for geom, body in zip(water.blocks, water.bodies, strict=True)
         ],
     }
 

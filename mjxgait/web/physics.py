@@ -104,6 +104,7 @@ def build_physics_page(
         licence=html.escape((web / "model-viewer.LICENSE").read_text(encoding="utf-8")),
         glb=base64.b64encode(glb).decode("ascii"),
         target=f"0m {height:.3f}m 0m",
+        wide=f"{np.degrees(WIDE):g}deg",
         far=f"{far:.3f}m",
         farthest=f"{FARTHEST * far:.3f}m",
         facts=_json(facts),

@@ -143,7 +143,7 @@ def test_a_page_simulates_what_the_examiner_simulates(walked, name):
     here, (qpos, target, fell) = walked[name]
     assert np.abs(np.array(here["qpos"]) - qpos).max() < TOLERANCE
     off = np.abs(np.array(here["target"]) - target).max()
-    assert off < TOLERANCE * max(1.0, np.abs(target).max())
+    assert off < TOLERANCE * (np.abs(target).max() if "brain" in name else 1.0)
     assert here["fell"] == (None if np.isinf(fell) else pytest.approx(fell))
 
 

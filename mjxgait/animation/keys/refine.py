@@ -97,24 +97,25 @@ def refining(creature: Creature, config: Config, brought: Brought, keep: float) 
         raise UserError(f"--keep {keep:g}: must lie between 0 and 1")
     poses, period = brought.fit.key_poses, brought.cycle.period
     slack = SLOWER * (1.0 - keep)
+    tuning = {"period": [period * (1.0 - slack), period * (1.0 + slack)]}
     near: dict[str, object] = {
         "key_poses": len(poses),
         "mirror": brought.cycle.mirrored,
         "advance": "clock",
         "around": [round(float(angle), 6) for angle in poses.ravel()],
         "within": FARTHEST * (1.0 - keep),
-        "tuning": {"period": [period * (1.0 - slack), period * (1.0 + slack)]},
     }
     spread = config.evolution.initial_spread
     if own := brought.own:
         ranges = dataclasses.asdict(config)["controller"]["tuning"]
         near["advance"] = own.advance
-        near["tuning"] = {n: _near(own.tuning[n], ranges[n], 1.0 - keep) for n in own.tuning}
+        tuning = {n: _near(own.tuning[n], ranges[n], 1.0 - keep) for n in own.tuning}
         spread = min(spread, OWN_SPREAD)
     if near["advance"] == "clock":
         whole = len(poses) * (1 + brought.cycle.mirrored)
         step = float(creature.model.opt.timestep)
-        near["interpolation"] = smooth(period * (1.0 + slack), whole, step)
+        near["interpolation"] = smooth(tuning["period"][1], whole, step)
+    near["tuning"] = tuning
     changes = {"controller": near, "evolution": {"initial_spread": spread}}
     return build(type(config), merge(dataclasses.asdict(config), changes), "the settings of refine")
 

@@ -143,6 +143,15 @@ def unhurried(seconds: float, time_step: float) -> int:
     return max(round(seconds / time_step / (2 * plain.key_poses)), plain.interpolation)
 
 
+def smooth(period: float, poses: int, time_step: float) -> int:
+    """Return the steps between poses with which a clock moves the target in every control step.
+
+    With fewer the target stands still and jumps, which shakes the feet.
+    period: s of the longest cycle. poses: of the whole cycle.
+    """
+    return max(math.ceil(period / (poses * time_step)), 1)
+
+
 @dataclasses.dataclass(frozen=True)
 class DriveConfig:
     """Settings of the drive: joint motors that follow a controller's commands.
@@ -160,12 +169,3 @@ class DriveConfig:
     constraint_forces: bool = False
     stiffness: Positive = 1.0
     damping: Positive = 1.0
-
-
-def smooth(period: float, poses: int, time_step: float) -> int:
-    """Return the steps between poses with which a clock moves the target in every control step.
-
-    With fewer the target stands still and jumps, which shakes the feet.
-    period: s of the longest cycle. poses: of the whole cycle.
-    """
-    return max(math.ceil(period / (poses * time_step)), 1)

@@ -120,7 +120,7 @@ export class Simulation {
       applied[dof] = torque[j];
     });
     data.xfrc_applied.fill(0);
-    this.water?.press(data);
+    this.water?.press(this);
     this.applyPull();
     mujoco.mj_step2(model, data);
     this.forces.set(data.qfrc_constraint);
@@ -292,24 +292,33 @@ export class Simulation {
 
   // The visitor's spring, and a damper, from a point of a body to a place in the world.
   applyPull() {
-    const { data, pull } = this;
+    const { pull } = this;
     if (!pull) return;
     const { body, target, stiffness, damping, most } = pull,
       point = this.pulledPoint();
-    const rooted = minus(point, three(data.subtree_com, this.model.body_rootid[body]));
-    const [spin, shift] = [
-      data.cvel.slice(6 * body, 6 * body + 3),
-      data.cvel.slice(6 * body + 3, 6 * body + 6),
-    ];
-    const carried = cross(spin, rooted);
+    const velocity = this.velocityAt(body, point);
     const force = point.map(
-      (value, i) => stiffness * (target[i] - value) - damping * (shift[i] + carried[i]),
+      (value, i) => stiffness * (target[i] - value) - damping * velocity[i],
     );
     const share = Math.min(1, most / Math.max(Math.hypot(...force), 1e-9));
     force.forEach((value, i) => {
       force[i] = share * value;
     });
-    const moment = cross(minus(point, three(data.xipos, body)), force);
+    this.pushAt(body, point, force);
+  }
+
+  // Velocity [3] of a body at a point in the world. MuJoCo gives it at the centre of its tree.
+  velocityAt(body, point) {
+    const { data, model } = this,
+      rooted = minus(point, three(data.subtree_com, model.body_rootid[body])),
+      carried = cross(three(data.cvel, 2 * body), rooted);
+    return three(data.cvel, 2 * body + 1).map((value, i) => value + carried[i]);
+  }
+
+  // Add a force [3] on a body at a point in the world to those of this step.
+  pushAt(body, point, force) {
+    const { data } = this,
+      moment = cross(minus(point, three(data.xipos, body)), force);
     [...force, ...moment].forEach((value, i) => {
       data.xfrc_applied[6 * body + i] += value;
     });

@@ -139,6 +139,7 @@ export class View {
     const [[x1, y1], [x2, y2]] = ends.map(end => this.pixel(end));
     for (const [key, value] of Object.entries({ x1, y1, x2, y2 })) line.setAttribute(key, value);
   }
+
   // Draw a spot at a point, or none; at the edge if the point is out of view. Its class is its look.
   spot(name, point) {
     const spot = this.overlay.querySelector(`circle.${name}`);

@@ -7,46 +7,26 @@ const PLACES = [-Math.sqrt(0.6), 0, Math.sqrt(0.6)];
 const SHARES = [5 / 18, 8 / 18, 5 / 18];
 const three = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross = (a, b) => [
-  a[1] * b[2] - a[2] * b[1],
-  a[2] * b[0] - a[0] * b[2],
-  a[0] * b[1] - a[1] * b[0],
-];
 
 export class Water {
-  // facts: `water` of mjxgait/web/facts.py: drag in N·s/m³; blocks: geom, body, root, and half sizes.
+  // facts: `water` of mjxgait/web/facts.py: drag in N·s/m³; blocks: geom, body, and half sizes.
   constructor({ drag, blocks }) {
     this.drag = drag;
     this.blocks = blocks.map(block => ({ ...block, points: pointsOf(block.half) }));
   }
 
-  // Add the forces to MuJoCo's `xfrc_applied`.
-  press(data) {
-    for (const { geom, body, root, points } of this.blocks) {
-      const rot = data.geom_xmat.slice(9 * geom, 9 * geom + 9),
-        middle = three(data.geom_xpos, geom),
-        heavy = three(data.xipos, body),
-        whole = three(data.subtree_com, root);
-      const [spin, shift] = [three(data.cvel, 2 * body), three(data.cvel, 2 * body + 1)];
+  // Add the forces of this step. simulation: as in simulation.js.
+  press(simulation) {
+    const { geom_xpos, geom_xmat } = simulation.data;
+    for (const { geom, body, points } of this.blocks) {
+      const rot = geom_xmat.slice(9 * geom, 9 * geom + 9),
+        middle = three(geom_xpos, geom);
       for (const { place, axis, side, area } of points) {
         const point = middle.map((value, i) => value + dot(three(rot, i), place));
         const normal = [0, 1, 2].map(i => side * rot[3 * i + axis]);
-        const carried = cross(
-          spin,
-          point.map((value, i) => value - whole[i]),
-        );
-        const along = dot(
-          shift.map((value, i) => value + carried[i]),
-          normal,
-        );
+        const along = dot(simulation.velocityAt(body, point), normal);
         const force = normal.map(value => -this.drag * area * along * value);
-        const moment = cross(
-          point.map((value, i) => value - heavy[i]),
-          force,
-        );
-        [...force, ...moment].forEach((value, i) => {
-          data.xfrc_applied[6 * body + i] += value;
-        });
+        simulation.pushAt(body, point, force);
       }
     }
   }
