@@ -48,7 +48,8 @@ class Joints:
     """The actuated joints.
 
     stand: [J] rad, standing. pose_low, pose_high: [J] rad, of targets. low, high: [J] rad, of the
-    joints themselves. qpos, dofs: [J] their places in `qpos` and `qvel`.
+    joints themselves. qpos, dofs: [J] their places in `qpos` and `qvel`. swings: an arm's joint,
+    the leg's joint that it swings with, and the share of that one's angle from standing.
     """
 
     stand: np.ndarray
@@ -59,6 +60,7 @@ class Joints:
     names: tuple[str, ...] = _static()
     qpos: tuple[int, ...] = _static()
     dofs: tuple[int, ...] = _static()
+    swings: tuple[tuple[int, int, float], ...] = dataclasses.field(default=(), metadata=STATIC)
 
     @functools.cached_property
     def qpos_adr(self) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The static facts of a body that the other packages need."""
 
+import copy
 import dataclasses
 import hashlib
 from collections.abc import Mapping
@@ -75,6 +76,15 @@ class Creature:
     def rest_qpos(self) -> np.ndarray:
         """Rest pose [nq] of the bones in animation files."""
         return np.array(self.model.key(REST).qpos) if self.is_rig else self.stand_qpos
+
+    @property
+    def rest_model(self) -> mujoco.MjModel:
+        """The model with arms as the file's skeleton rests: spread, where the body's arms hang."""
+        model = copy.copy(self.model)
+        for part, quat in self.settings.rig.turned.items():
+            hangs, back = model.body(part).quat, np.array([quat[0], *(-x for x in quat[1:])])
+            mujoco.mju_mulQuat(hangs, hangs.copy(), back)
+        return model
 
     @property
     def is_rig(self) -> bool:

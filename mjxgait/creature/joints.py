@@ -1,4 +1,6 @@
-"""Mirror partners of joints, and the joints that step under a fall."""
+"""Mirror partners of joints, the joints that step under a fall, and arms that swing."""
+
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -6,7 +8,7 @@ import numpy as np
 from mjxgait.creature import geometry
 from mjxgait.creature.anatomy import Stepping
 from mjxgait.creature.creature import SLIDE
-from mjxgait.creature.settings import CreatureSettings
+from mjxgait.creature.settings import CreatureSettings, Swing
 from mjxgait.errors import UserError, did_you_mean
 
 
@@ -105,3 +107,25 @@ def stepping_of(
             )
         legs.append(moved[0] if moved else 0)
     return Stepping(ahead, aside, turn, tuple(legs))
+
+
+def swings_of(
+    settings: Mapping[str, Swing], names: list[str]
+) -> tuple[tuple[int, int, float], ...]:
+    """Joints [J] that swing with others; see `Joints.swings`.
+
+    Raises:
+      UserError: names a joint that the creature lacks, or a leg's joint that itself swings along.
+    """
+    for name in (*settings, *(swing.leg for swing in settings.values())):
+        if name not in names:
+            raise UserError(f'swing: no joint is called "{name}"; {did_you_mean(name, names)}')
+    for arm, swing in settings.items():
+        if swing.leg in settings:
+            raise UserError(
+                f'swing: "{arm}" swings with "{swing.leg}", which itself swings with another joint; '
+                "name a joint of a leg"
+            )
+    return tuple(
+        (names.index(arm), names.index(swing.leg), swing.share) for arm, swing in settings.items()
+    )

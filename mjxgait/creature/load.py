@@ -26,7 +26,7 @@ from mjxgait.creature.creature import (
     Creature,
 )
 from mjxgait.creature.geometry import check_world
-from mjxgait.creature.joints import mirrored, stepping_of
+from mjxgait.creature.joints import mirrored, stepping_of, swings_of
 from mjxgait.creature.settings import CreatureSettings, JointException
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.files import read_text
@@ -75,8 +75,9 @@ def _assemble(
     settings: CreatureSettings, files: Mapping[str, str], model: mujoco.MjModel
 ) -> Creature:
     trunk = _id(model, mujoco.mjtObj.mjOBJ_BODY, settings.creature.trunk, "creature.trunk")
-    for part in settings.rig.bones:
-        _id(model, mujoco.mjtObj.mjOBJ_BODY, part, "rig.bones")
+    for key, parts in (("rig.bones", settings.rig.bones), ("rig.turned", settings.rig.turned)):
+        for part in parts:
+            _id(model, mujoco.mjtObj.mjOBJ_BODY, part, key)
     check_world(model, trunk, _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor"))
     data = _standing(model, settings.creature.keyframe)
     axes = _trunk_axes(data.xmat[trunk].reshape(3, 3), np.array(settings.creature.forward))
@@ -91,7 +92,9 @@ def _assemble(
         trunk=trunk,
         stand_qpos=data.qpos.copy(),
         frame=_frame(model, data, settings, axes, found),
-        joints=_joints(model, data, found, np.radians(values["range"])),
+        joints=_joints(
+            model, data, found, np.radians(values["range"]), swings_of(settings.swing, names)
+        ),
         gains=Gains(values["kp"], values["kd"], values["torque_limit"]),
         mirror=Mirror(sign, tuple(map(int, partner)), settings.mirror.symmetric),
         corrections=Corrections(
@@ -129,9 +132,16 @@ def _actuated(model: mujoco.MjModel, trunk: int) -> list[int]:
 
 
 def _joints(
-    model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], poses: np.ndarray
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    joints: list[int],
+    poses: np.ndarray,
+    swings: tuple[tuple[int, int, float], ...],
 ) -> Joints:
-    """The actuated joints. poses: [J, 2] rad, range of targets about the standing pose."""
+    """The actuated joints.
+
+    poses: [J, 2] rad, range of targets about the standing pose. swings: see `Joints`.
+    """
     stand, given = data.qpos[model.jnt_qposadr[joints]], model.jnt_range[joints]
     endless = (given == 0).all(1, keepdims=True)
     low, high = np.where(endless, [-np.inf, np.inf], given).T
@@ -144,6 +154,7 @@ def _joints(
         pose_high=np.minimum(stand + poses[:, 1], high),
         low=low,
         high=high,
+        swings=swings,
     )
 
 

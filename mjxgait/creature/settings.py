@@ -131,6 +131,15 @@ class Stepping:
 
 
 @dataclasses.dataclass(frozen=True)
+class Swing:
+    """An arm's joint that swings with a leg's, by a share of its angle from standing."""
+
+    __pydantic_config__ = STRICT
+    leg: str
+    share: Finite
+
+
+@dataclasses.dataclass(frozen=True)
 class Termination:
     """Conditions that end an episode as failed.
 
@@ -151,12 +160,17 @@ class Termination:
 class RigSettings:
     """The character that the creature was imported from.
 
-    file: its name. bones: name of the bone in it, by the part that was made of it.
+    file: its name. bones: name of the bone in it, by the part that was made of it. turned: by the
+    part at the top of an arm that hangs, the quaternion (w, x, y, z), in the part's axes, from the
+    file's rest pose to that of creature.xml.
     """
 
     __pydantic_config__ = STRICT
     file: str = ""
     bones: dict[str, str] = dataclasses.field(default_factory=dict)
+    turned: dict[str, tuple[Finite, Finite, Finite, Finite]] = dataclasses.field(
+        default_factory=dict
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -179,6 +193,7 @@ class CreatureSettings:
     steering: Steering = dataclasses.field(default_factory=Steering)
     balance: Balance = dataclasses.field(default_factory=Balance)
     stepping: Stepping = dataclasses.field(default_factory=Stepping)
+    swing: dict[str, Swing] = dataclasses.field(default_factory=dict)
     termination: Termination = dataclasses.field(default_factory=Termination)
     rig: RigSettings = dataclasses.field(default_factory=RigSettings)
     usual: Usual = dataclasses.field(default_factory=Usual)

@@ -18,7 +18,7 @@ from mjxgait.importer.balance import steady_balance
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.bones import add_bones
 from mjxgait.importer.clean import clean_mjcf, clean_urdf
-from mjxgait.importer.drive import step_if_narrow
+from mjxgait.importer.drive import step_if_narrow, swing_arms
 from mjxgait.importer.find import find_anatomy
 from mjxgait.importer.notes import Notes, listed, one_line, plain_names, tell_dropped, tell_left_out
 from mjxgait.importer.orient import (
@@ -165,6 +165,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     )
     if source.bones and not planar:
         step_if_narrow(best.kinematics, best.q, best.drive, best.notes)
+        swing_arms(best.kinematics, best.drive, source.swings, best.notes)
     name = (
         plain_names([choices.name or path.stem.removesuffix(".urdf")], ["creature"])[0].strip(".-")
         or "creature"
@@ -176,7 +177,15 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
         for body, b in zip(anatomy.spec.bodies[1:], anatomy.bodies, strict=True)
         if source.bones
     }
-    return _folder(name, one_line(path.name), best, mirror, planar, rest, bones)
+    turned = {part: _quaternion(turn) for part, turn in source.turned.items()}
+    return _folder(name, one_line(path.name), best, mirror, planar, rest, bones, turned)
+
+
+def _quaternion(turn: np.ndarray) -> list[float]:
+    """Quaternion w, x, y, z of a rotation [3, 3]."""
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, turn.ravel())
+    return [round(float(value), 9) for value in quat]
 
 
 def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
@@ -227,10 +236,12 @@ def _folder(
     planar: bool,
     rest: np.ndarray | None,
     bones: Mapping[str, str],
+    turned: Mapping[str, Sequence[float]],
 ) -> Imported:
     """Write the texts of the folder.
 
     rest: [nq] rest pose of a skeleton, None for other models. bones: its bones by part.
+    turned: see `RigSettings`.
     """
     kinematics, notes = best.kinematics, best.notes
     notes.guess("trunk", kinematics.bodies[0].name, "high", "the body that all limbs hang on")
@@ -273,6 +284,7 @@ def _folder(
         length if shorter or is_rig else None,
         passing,
         bones,
+        turned,
         train,
     )
     report = (

@@ -4,6 +4,7 @@
 """
 
 import dataclasses
+from collections.abc import Collection
 
 import mujoco
 import numpy as np
@@ -55,6 +56,8 @@ NARROW = 0.28
 """Half the distance of left and right feet, in hip heights, below which a character on more feet
 also places its feet under a fall: it tips over its legs before a stride ends.
 """
+ARM, SWINGS = 0.6, "swing"
+"""Angle of an arm over that of the leg it swings with; the guess's name."""
 STEPPERS, APART = 2, 0.5
 """Most feet of a body that must step to catch a fall.
 
@@ -76,7 +79,8 @@ class Drive:
     """Joint roles, gains, torque limits and ranges, and the weights of steering and balance.
 
     role: of each joint. kp, kd, torque: [J]. ranges: [J, 2] deg. The dicts map joint names to
-    weights (docs/reference/controller.md). must_step: whether it stands on one foot in each step.
+    weights (docs/reference/controller.md); `swing` those of arms to a leg's joint and a share.
+    must_step: whether it stands on one foot in each step.
     """
 
     role: list[str]
@@ -91,6 +95,7 @@ class Drive:
     ahead: dict[str, float] = dataclasses.field(default_factory=dict)
     aside: dict[str, float] = dataclasses.field(default_factory=dict)
     turn: dict[str, float] = dataclasses.field(default_factory=dict)
+    swing: dict[str, tuple[str, float]] = dataclasses.field(default_factory=dict)
     must_step: bool = False
 
 
@@ -112,13 +117,11 @@ def plan_drive(
     weight = stronger * kinematics.mass * GRAVITY * stance.hip
     inertia = _own_inertia(kinematics)
     quick = QUICKNESS**2 * GRAVITY / stance.hip * inertia
-    kp = np.maximum(
-        weight * float(np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS)), quick
-    )
+    # Arms and the like bear no weight.
+    borne = weight * np.array([role != "other" for role in roles])
+    kp = np.maximum(borne * np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS), quick)
     kd = np.maximum(DAMPING * kp, 2 * LEAST_DAMPING * np.sqrt(kp * inertia))
-    own = np.maximum(
-        weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH)), SWING * quick
-    )
+    own = np.maximum(borne * np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH), SWING * quick)
     stated = kinematics.effort
     # The file's torque is used where it is plausible for a walk: 0 and 1000 N·m often mean
     # "unknown".
@@ -159,6 +162,25 @@ def step_if_narrow(kinematics: KinematicModel, q: np.ndarray, drive: Drive, note
         "medium",
         f"left and right feet are {2 * track:.2f} hip heights apart: it tips over its legs",
     )
+
+
+def swing_arms(
+    kinematics: KinematicModel, drive: Drive, swings: Collection[str], notes: Notes
+) -> None:
+    """Let each arm that can move swing with the leg of the other side.
+
+    swings: joints by which arms swing.
+    """
+    names, axes = kinematics.names, kinematics.data.xaxis[1:]
+    for j, name in enumerate(names):
+        side = float(kinematics.data.xanchor[j + 1][1])
+        legs = [leg for leg, weight in drive.stride.items() if weight * side < 0]
+        if name in swings and legs:
+            same = float(np.sign(axes[j] @ axes[names.index(legs[0])]))
+            drive.swing[name] = (legs[0], same * ARM)
+    if drive.swing:
+        arms = listed(list(drive.swing))
+        notes.guess(SWINGS, arms, "medium", "arms swing with the leg of the other side")
 
 
 def _own_inertia(kinematics: KinematicModel) -> np.ndarray:

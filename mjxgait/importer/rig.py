@@ -12,6 +12,8 @@ and its mirror image on the same parent, such as a bird's thighs, begin beside i
 """
 SHORT = 0.04
 """Share of the height below which a bone does not bend on its own."""
+COLLAR = 0.2
+"""Share of its reach within which an arm that begins with a collar bone leaves the middle."""
 TOE = 0.5
 """Share of the longest toe's length from which another one is a toe, not a spur."""
 LIMB, LOW = 0.4, 0.1
@@ -195,6 +197,25 @@ class Plan:
             chain.append(max(below, key=self._length))
         return chain
 
+    @cached_property
+    def arms(self) -> list[list[int]]:
+        """Bones of each arm from the shoulder down; a body on more feet, or a bird, has none.
+
+        A collar bone moves with the trunk: it begins near the middle.
+        """
+        found = []
+        for first in self.limbs:
+            if self.feet and not self.on_legs[first] and self._upright(first):
+                chain = self.limb(first)
+                collar = len(chain) > 1 and self.apart(first) < COLLAR * self.reach(first)
+                found.append(chain[1:] if collar else chain)
+        return found
+
+    def _upright(self, first: int) -> bool:
+        """Return whether a limb begins above the root rather than ahead of it."""
+        shoulder = np.abs(self.rig.places[first] - self.rig.places[0])
+        return bool(shoulder[self.up] > shoulder[self.ahead])
+
     def has_toes(self, bone: int) -> bool:
         """Return whether a limb splits at this bone into several of about equal reach (toes)."""
         reaches = sorted(map(self.reach, self.rig.children(bone)), reverse=True)
@@ -245,7 +266,8 @@ class Plan:
             if self.rig.parents[other] in below:
                 below.add(other)
         order = sorted(below)
-        return np.concatenate([self.rig.places[order], *[self.rig.ends[b] for b in order]])
+        ends = [end for other in order for _, end in self.segments(other)]
+        return np.array([*self.rig.places[order], *ends])
 
     def moves(self, bone: int) -> bool:
         """Return whether a bone is long enough to bend on its own."""

@@ -83,7 +83,7 @@ def slimmer(plan: Plan, hinges: Sequence[Sequence[Hinge]], radii: Sequence[float
     The flesh of a fat thigh folds where a capsule cannot.
     """
     part, above = _parts(plan, hinges)
-    shapes = [_points(plan, bone) for bone in range(len(radii))]
+    shapes = [points_along(plan, bone) for bone in range(len(radii))]
     slim = list(radii)
     legs = [bone for bone, inside in enumerate(plan.on_legs) if inside]
     for bone, other in itertools.product(legs, range(len(radii))):
@@ -113,7 +113,7 @@ def _parts(plan: Plan, hinges: Sequence[Sequence[Hinge]]) -> tuple[list[int], di
     return first, above
 
 
-def _points(plan: Plan, bone: int) -> np.ndarray:
+def points_along(plan: Plan, bone: int) -> np.ndarray:
     """Points [n, 3] along a bone."""
     along = np.linspace(0.0, 1.0, POINTS)[:, None]
     lines = [start + along * (end - start) for start, end in plan.segments(bone)]

@@ -15,6 +15,7 @@ from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.errors import UserError
 from mjxgait.importer.notes import Confidence, Guess, Notes, listed, plain_names
 from mjxgait.importer.rig import Plan
+from mjxgait.importer.rig_arms import hanging
 from mjxgait.importer.rig_hinges import Hinge, hinges_of
 from mjxgait.importer.rig_radii import SKINNED, THICK, radii_of, slimmer
 from mjxgait.importer.source import Source
@@ -48,6 +49,8 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
         raise UserError(
             f"{path}: all its bones begin in the middle; a creature needs legs to its left and right"
         )
+    rig, turned = hanging(plan)
+    plan = Plan(axis, rig)
     hinges = hinges_of(plan)
     radii = slimmer(plan, hinges, radii_of(plan))
     names = plain_names(
@@ -58,7 +61,27 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
     bones = dict(zip(names, map(written, plan.rig.names), strict=True))
     limbs = {name for name, inside in zip(names, plan.on_limbs, strict=True) if inside}
     tree = _tree(plan, hinges, radii, names, notes)
-    return Source(tree, up=upward, bones=bones, limbs=frozenset(limbs))
+    if turned:
+        arms = listed([names[bone] for bone in turned])
+        notes.guess(f"arms from {arms} down", "hang", "high", "the skeleton rests with spread arms")
+    return Source(
+        tree,
+        up=upward,
+        bones=bones,
+        limbs=frozenset(limbs),
+        turned={names[bone]: turn for bone, turn in turned.items()},
+        swings=_swings(plan, hinges, names),
+    )
+
+
+def _swings(plan: Plan, hinges: list[list[Hinge]], names: list[str]) -> frozenset[str]:
+    """Names of the hinges by which arms swing ahead and back."""
+    return frozenset(
+        f"{names[bone]}_{hinge.name}"
+        for bone, *_ in plan.arms
+        for hinge in hinges[bone]
+        if hinge.name == "pitch"
+    )
 
 
 def _bare(rig: Rig) -> Rig:

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from mjxgait.errors import UserError
 from mjxgait.files import read_bytes
@@ -40,7 +41,9 @@ class Source:
     poses: standing poses that the file offers outside keyframes.
     missing: keys of unavailable meshes, each with its expected file; MJCF only.
     up: axis that points up, of a skeleton. bones: its bones by the body that is made of each.
-    limbs: the bodies of its limbs, which alone may be legs; None for other models.
+    limbs: the bodies of its limbs, which alone may be legs; None for other models. turned: of each
+    body that hangs although the skeleton rests spread, the rotation [3, 3] from there. swings: names
+    of the joints by which arms swing.
     """
 
     tree: ET.Element
@@ -53,6 +56,8 @@ class Source:
     up: Guess | None = None
     bones: dict[str, str] = dataclasses.field(default_factory=dict)
     limbs: frozenset[str] | None = None
+    turned: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    swings: frozenset[str] = frozenset()
 
 
 class Places:

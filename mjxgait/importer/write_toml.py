@@ -1,6 +1,6 @@
 """Text of creature.toml: the guesses, each with its confidence beside it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import tomli_w
@@ -24,6 +24,7 @@ def creature_toml(
     body_length: float | None,
     planar: bool,
     bones: Mapping[str, str],
+    turned: Mapping[str, Sequence[float]],
     train: Table,
 ) -> str:
     """Return the text of creature.toml.
@@ -32,7 +33,7 @@ def creature_toml(
       origin: the model file's name, in one line. best: the creature in its standing pose. pairs:
         stated mirror pairs, joint to partner and sign. body_length: m, None if the loader measures
         it. planar: whether its legs are in one plane and pass each other. bones: of a skeleton, by
-        part. train: settings that differ from the defaults.
+        part. turned: see `RigSettings`. train: settings that differ from the defaults.
     """
     joints, drive, notes = best.kinematics.names, best.drive, best.notes
     root = best.kinematics.bodies[0]
@@ -60,7 +61,7 @@ def creature_toml(
     if planar:
         lines.append("planar = true  # high: its legs are drawn in one plane, and pass each other")
     lines += ["", *_joints(joints, drive, remark), *_mirror(symmetric, pairs, remark)]
-    lines += _rig(origin, bones)
+    lines += _rig(origin, bones, turned)
     if gait := remark.get(GAIT):
         lines += ["[usual]", f'gait = "natural"{gait}', ""]
     lines += [*_corrections(drive), "[termination]", "min_up = 0.5", "height = [0.5, 1.5]"]
@@ -128,16 +129,27 @@ def _corrections(drive: Drive) -> list[str]:
             f"turn = {_table(drive.turn)}",
             "",
         ]
+    if drive.swing:
+        rows = [
+            f"{_quoted(arm)} = {{ leg = {_quoted(leg)}, share = {share} }}"
+            for arm, (leg, share) in drive.swing.items()
+        ]
+        lines += ["[swing]  # medium: arms swing with the leg of the other side", *rows, ""]
     return lines
 
 
-def _rig(origin: str, bones: Mapping[str, str]) -> list[str]:
+def _rig(origin: str, bones: Mapping[str, str], turned: Mapping[str, Sequence[float]]) -> list[str]:
     """Lines of a skeleton's bones by part; none for other models."""
     if not bones:
         return []
     rows = [f"{_quoted(part)} = {_quoted(bone)}" for part, bone in bones.items()]
     about = "# what each part is called in the file, for `mjxgait export --onto`"
-    return ["[rig]", f"file = {_quoted(origin)}", "", f"[rig.bones]  {about}", *rows, ""]
+    lines = ["[rig]", f"file = {_quoted(origin)}", "", f"[rig.bones]  {about}", *rows, ""]
+    if turned:
+        lines.append("[rig.turned]  # w, x, y, z from the file's rest to hanging arms")
+        lines += [f"{_quoted(part)} = {list(quat)}" for part, quat in turned.items()]
+        lines.append("")
+    return lines
 
 
 def _usual(values: np.ndarray) -> float:

@@ -152,7 +152,7 @@ def _fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> F
     """
     creature = loop.walk.creature
     skeleton, axes = skeleton_of(creature.model, creature.trunk), gltf_axes(loop.walk.forward)
-    pos, _ = world_poses(creature.model, skeleton, resting(loop)[None], axes)
+    pos, _ = world_poses(creature.rest_model, skeleton, resting(loop)[None], axes)
     parts = pos[0, [skeleton.names.index(part) for part in bones]]
     places = character.world[list(bones.values()), :3, 3]
     own, other = parts - parts.mean(0), places - places.mean(0)
@@ -213,7 +213,7 @@ def _goals(
     """
     creature = loop.walk.creature
     skeleton, axes = skeleton_of(creature.model, creature.trunk), gltf_axes(loop.walk.forward)
-    _, still = world_poses(creature.model, skeleton, resting(loop)[None], axes)
+    _, still = world_poses(creature.rest_model, skeleton, resting(loop)[None], axes)
     pos, rot = walked(loop, skeleton, axes, travelling)
     turned = fit.turns(rot @ still.transpose(0, 1, 3, 2))
     goals = {}

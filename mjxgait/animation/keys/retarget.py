@@ -151,7 +151,7 @@ def retarget(
             f"none of its bones is like a part of {creature.name}: {', '.join(movers(creature))}; "
             "name them in a table with --names"
         )
-    rest = _world(creature)
+    rest = _world(creature, clip)
     turned = {
         body: axes.T @ clip.turned[:, bone] @ axes
         for body, bone in {creature.trunk: _trunk_bone(clip, parts, creature), **parts}.items()
@@ -205,11 +205,12 @@ def _trunk_bone(clip: Clip, parts: Mapping[int, int], creature: Creature) -> int
     return next((bone for bone in lineage(first) if bone in common), lineage(first)[-1])
 
 
-def _world(creature: Creature) -> dict[int, np.ndarray]:
-    """World rotation [3, 3] of each body in the rest pose."""
-    data = mujoco.MjData(creature.model)
+def _world(creature: Creature, clip: Clip) -> dict[int, np.ndarray]:
+    """World rotation [3, 3] of each body in the rest pose of the file, or of our own export."""
+    model = creature.model if clip.note else creature.rest_model
+    data = mujoco.MjData(model)
     data.qpos[:] = creature.rest_qpos
-    mujoco.mj_kinematics(creature.model, data)
+    mujoco.mj_kinematics(model, data)
     return {b: data.xmat[b].reshape(3, 3).copy() for b in range(creature.model.nbody)}
 
 

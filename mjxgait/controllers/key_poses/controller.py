@@ -118,7 +118,7 @@ class PoseTracker:
         """The first created genome has the key poses of `settings.around`."""
         usual = pose_variation(Box(*self.bounds(settings)), evolution)
         if not settings.around:
-            return usual
+            return self._swinging(usual) if self.creature.joints.swings else usual
 
         def create(key: jax.Array, count: int) -> Genome:
             made = usual.create(key, count)
@@ -126,6 +126,24 @@ class PoseTracker:
             return dataclasses.replace(made, key_poses=poses)
 
         return dataclasses.replace(usual, create=create)
+
+    def _swinging(self, usual: Variation) -> Variation:
+        """Return operators after which arms swing with legs (`Joints.swings`)."""
+        joints = self.creature.joints
+
+        def swung(genome: Genome) -> Genome:
+            poses = genome.key_poses
+            for arm, leg, share in joints.swings:
+                angle = joints.stand[arm] + share * (poses[..., leg] - joints.stand[leg])
+                angle = jnp.clip(angle, joints.pose_low[arm], joints.pose_high[arm])
+                poses = poses.at[..., arm].set(angle)
+            return dataclasses.replace(genome, key_poses=poses)
+
+        return dataclasses.replace(
+            usual,
+            create=lambda key, count: swung(usual.create(key, count)),
+            mutate=lambda key, genome: swung(usual.mutate(key, genome)),
+        )
 
     def genes(self, genomes: Genome, settings: PoseConfig) -> np.ndarray:
         """See `Controller`."""
