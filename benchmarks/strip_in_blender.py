@@ -36,7 +36,7 @@ def main() -> None:
     size = high - low
     lit(bpy.context.scene)
     camera = camera_of(bpy.context.scene, WIDER * float(size.max()))
-    aside = Vector((1.0, 0.0, 0.0) if size[1] > size[0] else (0.0, -1.0, 0.0))
+    aside = Vector((1.0, 0.0, 0.0))  # glTF's characters look along +Z, which is Blender's -Y
     pictures = []
     for i in range(given.frames):
         bpy.context.scene.frame_set(math.floor(first + (last - first) * i / given.frames))

@@ -246,3 +246,4 @@ def test_a_cycle_of_the_file_is_read_from_its_own_rest(
     brought = bring(creature, own)
     arm = creature.joints.names.index("LArm_pitch")
     assert brought.track.angles[:, arm] == pytest.approx(creature.joints.stand[arm], abs=0.1)
+    assert brought.track.errors["LArm_pitch"].max() < 0.1, "the hinge can do what the clip shows"
