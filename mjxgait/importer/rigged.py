@@ -61,16 +61,21 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
     bones = dict(zip(names, map(written, plan.rig.names), strict=True))
     limbs = {name for name, inside in zip(names, plan.on_limbs, strict=True) if inside}
     tree = _tree(plan, hinges, radii, names, notes)
+    swings = _swings(plan, hinges, names)
     if turned:
         arms = listed([names[bone] for bone in turned])
-        notes.guess(f"arms from {arms} down", "hang", "high", "the skeleton rests with spread arms")
+        reason = "the skeleton rests with spread arms"
+        if swings:
+            options = " ".join(f"--keep {name}" for name in sorted(swings))
+            reason += f"; {options} lets them swing"
+        notes.guess(f"arms from {arms} down", "hang", "high", reason)
     return Source(
         tree,
         up=upward,
         bones=bones,
         limbs=frozenset(limbs),
         turned={names[bone]: turn for bone, turn in turned.items()},
-        swings=_swings(plan, hinges, names),
+        swings=swings,
     )
 
 
