@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import pytest
+from importer.test_manner import BIPED
 
 from mjxgait.api import load_creature
 from mjxgait.certification import CertificateConfig
 from mjxgait.config.schema import Config, RolloutConfig
-from mjxgait.importer.train_table import Traits, few_feet, four_feet
+from mjxgait.importer.train_table import few_feet, four_feet
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 
@@ -56,19 +57,7 @@ def test_new_disturbances_of_other_settings():
 
 
 def test_new_disturbances_of_imported_bodies():
-    body = Traits(
-        steps=True,
-        legs=2,
-        hinges=12,
-        symmetric=True,
-        hip=0.5,
-        length=0.3,
-        mass=20.0,
-        time_step=0.005,
-        rotor=0.01,
-        skeleton=False,
-    )
-    on_two, _ = few_feet(body)
+    on_two, _ = few_feet(BIPED)
     assert on_two["rollout"]["latency"] >= EXAMINED.latency
     assert not {"masses", "slope"} & set(on_two["rollout"])
-    assert "rollout" not in four_feet(body)[0]
+    assert "rollout" not in four_feet(BIPED)[0]

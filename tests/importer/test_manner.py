@@ -13,22 +13,24 @@ from mjxgait.importer.notes import Notes
 from mjxgait.importer.train_table import Traits, train_table
 
 STEP = 0.005
+BIPED = Traits(
+    steps=True,
+    legs=2,
+    hinges=12,
+    symmetric=True,
+    hip=0.8,
+    length=0.8,
+    mass=30.0,
+    time_step=STEP,
+    rotor=0.01,
+    skeleton=False,
+)
 
 
-def told(hip: float = 0.8, length: float = 0.8, **facts: Any) -> tuple[Config, Notes]:
+def told(**facts: Any) -> tuple[Config, Notes]:
+    """Settings of `BIPED` with other traits, and the notes on them."""
     notes = Notes()
-    settled = {
-        "steps": True,
-        "legs": 2,
-        "hinges": 12,
-        "symmetric": True,
-        "mass": 30.0,
-        "time_step": STEP,
-        "rotor": 0.01,
-        "skeleton": False,
-    }
-    settled |= facts
-    table = train_table(Traits(hip=hip, length=length, **settled), notes)
+    table = train_table(dataclasses.replace(BIPED, **facts), notes)
     return build(Config, over_base(table, "the table"), "the table"), notes
 
 
