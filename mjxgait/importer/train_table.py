@@ -47,7 +47,7 @@ SMALLER = 0.03
 ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
-FLICKER, LEISURE = 2.0, 0.65
+FLICKER, LEISURE = 3.0, 0.65
 """Weight of feet that lose the floor for moments, of characters on more than two feet: their mass
 rests on small paws and hooves, which shake. And their target speed in body lengths per second: at
 the usual one they gallop.
