@@ -56,8 +56,8 @@ NARROW = 0.28
 """Half the distance of left and right feet, in hip heights, below which a character on more feet
 also places its feet under a fall: it tips over its legs before a stride ends.
 """
-ARM, SWINGS = 0.6, "swing"
-"""Angle of an arm over that of the leg it swings with; the guess's name."""
+ARM = 0.6
+"""Angle of an arm over that of the leg it swings with."""
 STEPPERS, APART = 2, 0.5
 """Most feet of a body that must step to catch a fall.
 
@@ -180,7 +180,7 @@ def swing_arms(
             drive.swing[name] = (legs[0], same * ARM)
     if drive.swing:
         arms = listed(list(drive.swing))
-        notes.guess(SWINGS, arms, "medium", "arms swing with the leg of the other side")
+        notes.guess("swing", arms, "medium", "arms swing with the leg of the other side")
 
 
 def _own_inertia(kinematics: KinematicModel) -> np.ndarray:

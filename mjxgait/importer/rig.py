@@ -213,8 +213,8 @@ class Plan:
 
     def _upright(self, first: int) -> bool:
         """Return whether a limb begins above the root rather than ahead of it."""
-        shoulder = np.abs(self.rig.places[first] - self.rig.places[0])
-        return bool(shoulder[self.up] > shoulder[self.ahead])
+        shoulder = self.rig.places[first] - self.rig.places[0]
+        return bool(shoulder[self.up] > abs(shoulder[self.ahead]))
 
     def has_toes(self, bone: int) -> bool:
         """Return whether a limb splits at this bone into several of about equal reach (toes)."""

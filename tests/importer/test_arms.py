@@ -133,7 +133,17 @@ def test_wings_and_arms_that_hang_already_stay(tmp_path: Path):
             ("Hand", "Forearm", (sign * 24, 86, 2), (sign * 24, 72, 3)),
         )
     }
-    for bones in (BIRD, REX, FIGURE | down):
+    below = FIGURE | {
+        side + name: (parent and (side + parent if parent in ARM else "Hips"), at, end)
+        for side, sign in (("L", 1), ("R", -1))
+        for name, parent, at, end in (
+            ("Collar", "Hips", (sign * 3, 94, 0), None),
+            ("Arm", "Collar", (sign * 18, 94, 0), None),
+            ("Forearm", "Arm", (sign * 46, 94, 0), None),
+            ("Hand", "Forearm", (sign * 72, 94, 0), (sign * 88, 94, 0)),
+        )
+    }
+    for bones in (BIRD, REX, FIGURE | down, below):
         plan = planned(tmp_path, bones)
         rig, turns = hanging(plan)
         assert not turns
