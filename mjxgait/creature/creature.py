@@ -82,7 +82,8 @@ class Creature:
         """The model with arms as the file's skeleton rests: spread, where the body's arms hang."""
         model = copy.copy(self.model)
         for part, quat in self.settings.rig.turned.items():
-            hangs, back = model.body(part).quat, np.array([quat[0], *(-x for x in quat[1:])])
+            hangs, back = model.body(part).quat, np.zeros(4)
+            mujoco.mju_negQuat(back, quat)
             mujoco.mju_mulQuat(hangs, hangs.copy(), back)
         return model
 

@@ -33,10 +33,7 @@ def mirrored(
         return partner, sign
     for pair in settings.mirror.pairs:
         for name in (pair.joint, pair.partner):
-            if name not in names:
-                raise UserError(
-                    f'mirror.pairs: no joint is called "{name}"; {did_you_mean(name, names)}'
-                )
+            _check_known(name, names, "mirror.pairs")
         partner[names.index(pair.joint)], sign[names.index(pair.joint)] = (
             names.index(pair.partner),
             pair.sign,
@@ -64,6 +61,11 @@ def mirrored(
         partner[free] = free[found]
     _check_names(names, partner)
     return partner, sign
+
+
+def _check_known(name: str, names: list[str], key: str) -> None:
+    if name not in names:
+        raise UserError(f'{key}: no joint is called "{name}"; {did_you_mean(name, names)}')
 
 
 def _check_names(names: list[str], partner: np.ndarray) -> None:
@@ -118,8 +120,7 @@ def swings_of(
       UserError: names a joint that the creature lacks, or a leg's joint that itself swings along.
     """
     for name in (*settings, *(swing.leg for swing in settings.values())):
-        if name not in names:
-            raise UserError(f'swing: no joint is called "{name}"; {did_you_mean(name, names)}')
+        _check_known(name, names, "swing")
     for arm, swing in settings.items():
         if swing.leg in settings:
             raise UserError(

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
@@ -11,6 +11,7 @@ import numpy as np
 
 from mjxgait.animation.clips.clip import ELSEWHERE
 from mjxgait.creature import geometry
+from mjxgait.creature.settings import RigSettings
 from mjxgait.errors import UserError
 from mjxgait.files import read_bytes
 from mjxgait.importer.anatomy import in_plane
@@ -177,15 +178,15 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
         for body, b in zip(anatomy.spec.bodies[1:], anatomy.bodies, strict=True)
         if source.bones
     }
-    turned = {part: _quaternion(turn) for part, turn in source.turned.items()}
-    return _folder(name, one_line(path.name), best, mirror, planar, rest, bones, turned)
+    turned = {part: _rounded(geometry.quaternion(turn)) for part, turn in source.turned.items()}
+    origin = one_line(path.name)
+    rig = RigSettings(origin, bones, turned)
+    return _folder(name, origin, best, mirror, planar, rest, rig)
 
 
-def _quaternion(turn: np.ndarray) -> list[float]:
-    """Quaternion w, x, y, z of a rotation [3, 3]."""
-    quat = np.zeros(4)
-    mujoco.mju_mat2Quat(quat, turn.ravel())
-    return [round(float(value), 9) for value in quat]
+def _rounded(quat: np.ndarray) -> tuple[float, float, float, float]:
+    w, x, y, z = (round(float(value), 9) for value in quat)
+    return w, x, y, z
 
 
 def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
@@ -235,13 +236,11 @@ def _folder(
     mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
     rest: np.ndarray | None,
-    bones: Mapping[str, str],
-    turned: Mapping[str, Sequence[float]],
+    rig: RigSettings,
 ) -> Imported:
     """Write the texts of the folder.
 
-    rest: [nq] rest pose of a skeleton, None for other models. bones: its bones by part.
-    turned: see `RigSettings`.
+    rest: [nq] rest pose of a skeleton, None for other models. rig: its bones, none for others.
     """
     kinematics, notes = best.kinematics, best.notes
     notes.guess("trunk", kinematics.bodies[0].name, "high", "the body that all limbs hang on")
@@ -259,7 +258,7 @@ def _folder(
         )
     kinematics.pose(best.q)
     passing = planar and bool(geometry.parallel(kinematics.data.xaxis[1:]).all())
-    is_rig = bool(bones)
+    is_rig = bool(rig.bones)
     hip, length = _sizes(best, is_rig)
     shorter = length < hip
     if is_rig and not shorter:
@@ -283,8 +282,7 @@ def _folder(
         pairs,
         length if shorter or is_rig else None,
         passing,
-        bones,
-        turned,
+        rig,
         train,
     )
     report = (

@@ -198,17 +198,18 @@ class Plan:
         return chain
 
     @cached_property
-    def arms(self) -> list[list[int]]:
-        """Bones of each arm from the shoulder down; a body on more feet, or a bird, has none.
+    def arms(self) -> dict[int, list[int]]:
+        """Bones of each arm from the shoulder down, by the limb's first bone.
 
-        A collar bone moves with the trunk: it begins near the middle.
+        A body on more feet, or a bird, has none. A collar bone, which begins near the middle, moves
+        with the trunk.
         """
-        found = []
+        found = {}
         for first in self.limbs:
             if self.feet and not self.on_legs[first] and self._upright(first):
                 chain = self.limb(first)
                 collar = len(chain) > 1 and self.apart(first) < COLLAR * self.reach(first)
-                found.append(chain[1:] if collar else chain)
+                found[first] = chain[1:] if collar else chain
         return found
 
     def _upright(self, first: int) -> bool:
@@ -261,11 +262,7 @@ class Plan:
 
     def spots_below(self, bone: int) -> np.ndarray:
         """Starts and ends [n, 3] of a bone and all bones below it."""
-        below = {bone}
-        for other in range(bone + 1, len(self.rig.names)):
-            if self.rig.parents[other] in below:
-                below.add(other)
-        order = sorted(below)
+        order = self.rig.subtree(bone)
         ends = [end for other in order for _, end in self.segments(other)]
         return np.array([*self.rig.places[order], *ends])
 

@@ -93,8 +93,7 @@ def _bending(plan: Plan, first: int) -> list[int]:
     *upper, last = chain[: next(ends, len(chain)) + 1]
     chain = [*filter(plan.moves, upper), *[last] * (plan.reach(last) > SHORT * plan.height)]
     if plan.feet:
-        arm = next((arm for arm in plan.arms if arm[-1] == plan.limb(first)[-1]), chain)
-        return [bone for bone in chain if bone in arm]
+        return [bone for bone in chain if bone in plan.arms.get(first, chain)]
     if len(chain) > MOVING and plan.apart(chain[0]) < GIRDLE * plan.apart(chain[1]):
         chain = chain[1:]
     return chain[:MOVING]

@@ -89,11 +89,11 @@ def slimmer(plan: Plan, hinges: Sequence[Sequence[Hinge]], radii: Sequence[float
     for bone, other in itertools.product(legs, range(len(radii))):
         one, two = part[bone], part[other]
         near = one == two or above[one] == two or above[two] == one
-        if near or not (len(shapes[bone]) and len(shapes[other])):
+        if near:
             continue
-        apart = float(np.linalg.norm(shapes[bone][:, None] - shapes[other], axis=2).min())
-        both = apart / (radii[bone] + radii[other])  # between two legs, each gives way
-        share = both if other in legs else (apart - radii[other]) / radii[bone]
+        gap = apart(shapes[bone], shapes[other])
+        both = gap / (radii[bone] + radii[other])  # between two legs, each gives way
+        share = both if other in legs else (gap - radii[other]) / radii[bone]
         slim[bone] = min(slim[bone], radii[bone] * max(share, SLIMMEST))
     return slim
 
@@ -111,6 +111,11 @@ def _parts(plan: Plan, hinges: Sequence[Sequence[Hinge]]) -> tuple[list[int], di
         if first[bone] == bone:
             above[bone] = first[parent] if parent >= 0 else bone
     return first, above
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Least distance in m between two sets of points [n, 3], infinite if one is empty."""
+    return float(np.linalg.norm(one[:, None] - other, axis=2).min(initial=np.inf))
 
 
 def points_along(plan: Plan, bone: int) -> np.ndarray:

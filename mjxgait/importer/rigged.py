@@ -49,10 +49,10 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
         raise UserError(
             f"{path}: all its bones begin in the middle; a creature needs legs to its left and right"
         )
-    rig, turned = hanging(plan)
-    plan = Plan(axis, rig)
+    thick = radii_of(plan)
+    plan, turned = hanging(plan, thick)
     hinges = hinges_of(plan)
-    radii = slimmer(plan, hinges, radii_of(plan))
+    radii = slimmer(plan, hinges, thick)
     names = plain_names(
         [name.rpartition(":")[2] for name in plan.rig.names],
         [f"bone_{i}" for i in range(len(plan.rig.names))],
@@ -74,7 +74,7 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
         up=upward,
         bones=bones,
         limbs=frozenset(limbs),
-        turned={names[bone]: turn for bone, turn in turned.items()},
+        turned={names[bone]: turn.as_matrix() for bone, turn in turned.items()},
         swings=swings,
     )
 
@@ -83,7 +83,7 @@ def _swings(plan: Plan, hinges: list[list[Hinge]], names: list[str]) -> frozense
     """Names of the hinges by which arms swing ahead and back."""
     return frozenset(
         f"{names[bone]}_{hinge.name}"
-        for bone, *_ in plan.arms
+        for bone, *_ in plan.arms.values()
         for hinge in hinges[bone]
         if hinge.name == "pitch"
     )

@@ -1,12 +1,13 @@
 """Text of creature.toml: the guesses, each with its confidence beside it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import tomli_w
 
 from mjxgait.config.tables import Table
 from mjxgait.creature.geometry import rotation
+from mjxgait.creature.settings import RigSettings
 from mjxgait.importer.drive import Drive
 from mjxgait.importer.notes import one_line
 from mjxgait.importer.standing import Candidate
@@ -23,8 +24,7 @@ def creature_toml(
     pairs: Mapping[str, tuple[str, int]],
     body_length: float | None,
     planar: bool,
-    bones: Mapping[str, str],
-    turned: Mapping[str, Sequence[float]],
+    rig: RigSettings,
     train: Table,
 ) -> str:
     """Return the text of creature.toml.
@@ -32,8 +32,8 @@ def creature_toml(
     Args:
       origin: the model file's name, in one line. best: the creature in its standing pose. pairs:
         stated mirror pairs, joint to partner and sign. body_length: m, None if the loader measures
-        it. planar: whether its legs are in one plane and pass each other. bones: of a skeleton, by
-        part. turned: see `RigSettings`. train: settings that differ from the defaults.
+        it. planar: whether its legs are in one plane and pass each other. rig: of a skeleton.
+        train: settings that differ from the defaults.
     """
     joints, drive, notes = best.kinematics.names, best.drive, best.notes
     root = best.kinematics.bodies[0]
@@ -61,7 +61,7 @@ def creature_toml(
     if planar:
         lines.append("planar = true  # high: its legs are drawn in one plane, and pass each other")
     lines += ["", *_joints(joints, drive, remark), *_mirror(symmetric, pairs, remark)]
-    lines += _rig(origin, bones, turned)
+    lines += _rig(rig)
     if gait := remark.get(GAIT):
         lines += ["[usual]", f'gait = "natural"{gait}', ""]
     lines += [*_corrections(drive), "[termination]", "min_up = 0.5", "height = [0.5, 1.5]"]
@@ -138,16 +138,16 @@ def _corrections(drive: Drive) -> list[str]:
     return lines
 
 
-def _rig(origin: str, bones: Mapping[str, str], turned: Mapping[str, Sequence[float]]) -> list[str]:
+def _rig(rig: RigSettings) -> list[str]:
     """Lines of a skeleton's bones by part; none for other models."""
-    if not bones:
+    if not rig.bones:
         return []
-    rows = [f"{_quoted(part)} = {_quoted(bone)}" for part, bone in bones.items()]
+    rows = [f"{_quoted(part)} = {_quoted(bone)}" for part, bone in rig.bones.items()]
     about = "# what each part is called in the file, for `mjxgait export --onto`"
-    lines = ["[rig]", f"file = {_quoted(origin)}", "", f"[rig.bones]  {about}", *rows, ""]
-    if turned:
+    lines = ["[rig]", f"file = {_quoted(rig.file)}", "", f"[rig.bones]  {about}", *rows, ""]
+    if rig.turned:
         lines.append("[rig.turned]  # w, x, y, z from the file's rest to hanging arms")
-        lines += [f"{_quoted(part)} = {list(quat)}" for part, quat in turned.items()]
+        lines += [f"{_quoted(part)} = {list(quat)}" for part, quat in rig.turned.items()]
         lines.append("")
     return lines
 

@@ -12,6 +12,7 @@ import pytest
 from animation.skinned import frames_of, treading_loop
 from importer.rigs import Bone, bvh, glb
 from importer.test_characters import BIRD, REX, sided
+from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.animation.export import build_onto, read_character, standing_still
@@ -55,6 +56,10 @@ def planned(tmp_path: Path, bones: dict[str, Bone]) -> Plan:
     return Plan(1, rig_of_bvh(file).scaled(0.01))
 
 
+def hung_of(plan: Plan) -> tuple[Plan, dict[int, Rotation]]:
+    return hanging(plan, radii_of(plan))
+
+
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("arms") / "figure.glb"
@@ -81,7 +86,8 @@ def at_rest(creature: Creature, model: mujoco.MjModel) -> mujoco.MjData:
 
 def test_spread_arms_hang_and_clear_the_legs(tmp_path: Path):
     plan = planned(tmp_path, FIGURE)
-    rig, turns = hanging(plan)
+    hung, turns = hung_of(plan)
+    rig = hung.rig
     names = list(rig.names)
     assert {names[bone] for bone in turns} == {"LArm", "RArm"}
     for side in "LR":
@@ -100,7 +106,7 @@ def test_without_collar_bones_the_whole_arm_hangs(tmp_path: Path):
     for side in "LR":
         bones[side + "Arm"] = ("Chest", bones[side + "Arm"][1], None)
     plan = planned(tmp_path, bones)
-    assert {plan.rig.names[bone] for bone in hanging(plan)[1]} == {"LArm", "RArm"}
+    assert {plan.rig.names[bone] for bone in hung_of(plan)[1]} == {"LArm", "RArm"}
 
 
 def test_arms_hang_beside_wide_hips(tmp_path: Path):
@@ -111,7 +117,7 @@ def test_arms_hang_beside_wide_hips(tmp_path: Path):
         if name != "Foot"
     }
     plan = planned(tmp_path, wide)
-    hung = Plan(1, hanging(plan)[0])
+    hung, _ = hung_of(plan)
     radii, names = radii_of(hung), list(hung.rig.names)
     places = {name: hung.rig.places[names.index(name)] for name in names}
     thick = radii[names.index("LThigh")] + radii[names.index("LForearm")]
@@ -123,29 +129,26 @@ def test_arms_hang_beside_wide_hips(tmp_path: Path):
 
 
 def test_wings_and_arms_that_hang_already_stay(tmp_path: Path):
-    down = {
-        side + name: (side + parent if parent in ARM else parent, place, end)
-        for side, sign in (("L", 1), ("R", -1))
-        for name, parent, place, end in (
-            ("Collar", "Chest", (sign * 3, 140, 0), None),
-            ("Arm", "Collar", (sign * 18, 140, 0), None),
-            ("Forearm", "Arm", (sign * 22, 112, 0), None),
-            ("Hand", "Forearm", (sign * 24, 86, 2), (sign * 24, 72, 3)),
-        )
-    }
-    below = FIGURE | {
-        side + name: (parent and (side + parent if parent in ARM else "Hips"), at, end)
-        for side, sign in (("L", 1), ("R", -1))
-        for name, parent, at, end in (
-            ("Collar", "Hips", (sign * 3, 94, 0), None),
-            ("Arm", "Collar", (sign * 18, 94, 0), None),
-            ("Forearm", "Arm", (sign * 46, 94, 0), None),
-            ("Hand", "Forearm", (sign * 72, 94, 0), (sign * 88, 94, 0)),
-        )
-    }
-    for bones in (BIRD, REX, FIGURE | down, below):
+    down = sided(
+        {
+            "Collar": ("Chest", (3, 140, 0), None),
+            "Arm": ("Collar", (18, 140, 0), None),
+            "Forearm": ("Arm", (22, 112, 0), None),
+            "Hand": ("Forearm", (24, 86, 2), (24, 72, 3)),
+        }
+    )
+    below = sided(
+        {
+            "Collar": ("Hips", (3, 94, 0), None),
+            "Arm": ("Collar", (18, 94, 0), None),
+            "Forearm": ("Arm", (46, 94, 0), None),
+            "Hand": ("Forearm", (72, 94, 0), (88, 94, 0)),
+        }
+    )
+    for bones in (BIRD, REX, FIGURE | down, FIGURE | below):
         plan = planned(tmp_path, bones)
-        rig, turns = hanging(plan)
+        hung, turns = hung_of(plan)
+        rig = hung.rig
         assert not turns
         assert (rig.places == plan.rig.places).all()
 
@@ -155,7 +158,7 @@ def test_a_hand_that_would_reach_the_floor_stays(tmp_path: Path):
         side + "Hand": (side + "Forearm", (sign * 120, 140, 0), (sign * 150, 140, 0))
         for side, sign in (("L", 1), ("R", -1))
     }
-    assert not hanging(planned(tmp_path, long))[1]
+    assert not hung_of(planned(tmp_path, long))[1]
 
 
 def test_the_files_rest_is_that_of_its_bones(creature: Creature):

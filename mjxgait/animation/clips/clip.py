@@ -141,6 +141,14 @@ class Rig:
         """Children of a bone."""
         return [i for i, parent in enumerate(self.parents) if parent == bone]
 
+    def subtree(self, bone: int) -> list[int]:
+        """A bone and all bones below it, in order."""
+        below = {bone}
+        for other, parent in enumerate(self.parents):
+            if parent in below:
+                below.add(other)
+        return sorted(below)
+
     def taken(self, bones: list[int]) -> "Rig":
         """Return some of the bones, in this order; the nearest ancestor taken becomes parent."""
 
