@@ -1,6 +1,8 @@
 """Documentation: every link has a target, and the index links every page."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -35,11 +37,20 @@ def test_every_page_is_found_from_the_index():
 
 
 def test_every_page_is_in_the_navigation_of_the_site():
-    """The site itself is built by `mkdocs build --strict`, outside of these tests."""
     site = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     listed = re.findall(r"^ +- (?:[^:#]+: )?(\S+\.md)$", site, re.M)
     assert len(listed) == len(set(listed))
     assert set(listed) == {page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")}
+
+
+def test_the_site_is_built_without_a_warning(tmp_path: Path):
+    """Such as a link without a target, or a docstring that describes no argument."""
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", tmp_path]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert not done.returncode, done.stderr
+    pages = {page.relative_to(DOCS).with_suffix("") for page in DOCS.rglob("*.md")}
+    addresses = {page.parent if page.name == "README" else page for page in pages}
+    assert all((tmp_path / address / "index.html").is_file() for address in addresses)
 
 
 def test_no_page_links_out_of_the_site():

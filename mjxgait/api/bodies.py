@@ -36,8 +36,10 @@ def import_model(
       out: the folder to make.
       name: of the creature; by default the file's.
       search: further folders for meshes and includes.
-      keep, freeze: patterns of joints.
-      up, forward: axes of the file, if the guess is wrong.
+      keep: patterns of joints that stay movable although they carry no leg.
+      freeze: patterns of joints to freeze.
+      up: axis of the file that points up, if the guess is wrong.
+      forward: walking direction, if the guess is wrong.
       height: m; of a skeleton at rest.
       force: overwrites an existing creature folder.
       tell: called with the notes of the import.

@@ -31,8 +31,10 @@ def environment(
     Args:
       creature: shipped creature, creature folder, model file, or a loaded one.
       task: a shipped name, or FILE.py:CLASS of your own; by default the creature's usual task.
-      config, settings: as for `train`. observe: names of observations
-        (docs/reference/controller.md). perturbed: False begins every episode alike, undisturbed.
+      config: as for `train`.
+      settings: as for `train`.
+      observe: names of observations (docs/reference/controller.md).
+      perturbed: False begins every episode alike, undisturbed.
 
     Raises:
       UserError: an invalid argument, or a body that grows, explained in one sentence.

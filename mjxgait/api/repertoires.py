@@ -116,10 +116,12 @@ def repertoire(
       env: as for `train`.
       speeds: such as "0.4" (m/s), "0.4bl/s" (body lengths per second), "fr0.2" (Froude number).
       turns: degrees per second, each to both sides.
-      gait, style: of all walks, as for `train`.
+      gait: of all walks, as for `train`.
+      style: of all walks, as for `train`.
       config: file with settings, or the name of a shipped config.
       out: the folder, which must be empty or new; by default runs/repertoire-CREATURE.
-      population, generations: of each walk.
+      population: individuals in a generation of each walk.
+      generations: at most, of each walk.
       seed: of all random numbers.
       rate: key frames per second of the clips.
       travelling: moves the root in the clips.

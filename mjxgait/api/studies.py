@@ -99,7 +99,11 @@ def ablate(
     Args:
       study: file of a study, or the name of a shipped one.
       out: the folder, which must be empty or new; by default runs/ablate-STUDY.
-      env, seeds, first_seed, generations, config: instead of the study's own.
+      env: instead of the study's own creature.
+      seeds: number of seeds, instead of the study's own.
+      first_seed: instead of the study's own.
+      generations: instead of the study's own.
+      config: instead of the study's own.
       rows: runs side by side in one program; by default all.
       hours: refuses a study that may take longer.
       quiet: prints nothing.

@@ -25,8 +25,6 @@ FARTHEST = 3.0
 """Largest distance to which a reader can move the camera, in units of the first."""
 SHADOW = 0.9
 """Darkness of the shadow."""
-FAR = 1.7
-"""Camera distance in units of the creature's size, or farther where a loop needs more room."""
 
 
 def write_page(run: Path, out: Path) -> str:
@@ -70,7 +68,7 @@ def viewer_script() -> str:
 def build_page(walk: Walk, loop: WalkLoop, verdict: str, sections: str) -> str:
     """Return the text of the page. verdict, sections: HTML above and below the walk."""
     web = resources.files("mjxgait.web") / "assets"
-    target, far = viewpoint(loop, FAR)
+    target, far = viewpoint(loop)
     return string.Template((web / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(walk.creature.name.replace("_", " ")),
         style=style(),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers import made_up_certificate
 from rendering.made_up import treading, write_run
-from web.browser import canvas, drawn, is_blank, watched_tab
+from web.browser import canvas, drawn, is_blank, wait_until, watched_tab
 
 from mjxgait.certification import Certificate, CertificateConfig, Criterion, Measure
 from mjxgait.certification.stress import Stress, StressConfig, Trial
@@ -127,9 +127,28 @@ def test_the_animation_can_be_saved(opened):
 
 def test_the_camera_has_preset_views(opened):
     tab, _, _ = opened
-    for place, turned in (("side", -90), ("front", 0)):
+    assert pressed(tab) == ["corner"]
+    for place, turned, down in (("top", -90, 8), ("side", -90, 86), ("front", 0, 84)):
         tab.click(f'.view:has-text("{place}")')
-        assert tab.evaluate("walk.cameraOrbit").startswith(f"{turned}deg")
+        tab.evaluate("walk.jumpCameraToGoal()")
+        tab.wait_for_timeout(200)
+        shown = tab.evaluate("walk.getCameraOrbit()")
+        turns = np.degrees([shown["theta"], shown["phi"]])
+        assert turns == pytest.approx([turned, down], abs=0.1)
+        # The viewer would stand back to show the whole floor.
+        assert f"{shown['radius']:.3f}m" == tab.evaluate("walk.cameraOrbit").split()[2]
+        assert tab.evaluate("walk.getFieldOfView()") == pytest.approx(30.0)
+        assert pressed(tab) == [place]
+    box = tab.locator("#walk").bounding_box()
+    tab.mouse.move(box["x"] + 50, box["y"] + 50)
+    tab.mouse.down()
+    tab.mouse.move(box["x"] + 90, box["y"] + 50, steps=5)
+    tab.mouse.up()
+    wait_until(tab, "!document.querySelector('.view[aria-pressed=true]')")
+
+
+def pressed(tab):
+    return tab.locator('.view[aria-pressed="true"]').all_inner_texts()
 
 
 def test_the_page_fits_a_phone(browser, page):

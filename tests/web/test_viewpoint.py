@@ -11,7 +11,6 @@ from rendering.grown import grown_walk, leaps, straight
 from mjxgait.animation.export import viewpoint, walk_take
 from mjxgait.animation.export.skeleton import gltf_axes
 from mjxgait.animation.export.viewpoint import ASPECT, ORBITS
-from mjxgait.web.page import FAR
 
 HALF = np.tan(np.radians(15.0))
 
@@ -32,7 +31,7 @@ def projected(points: np.ndarray, target: np.ndarray, far: float, orbit: np.ndar
 @pytest.mark.parametrize("way", [leaps(0.9), straight(1.0, 0.5, 0.0)])
 def test_no_corner_of_any_frame_is_outside_the_page(way: np.ndarray):
     loop = walk_take(grown_walk("jump", way))
-    target, far = viewpoint(loop, FAR)
+    target, far = viewpoint(loop)
     axes = gltf_axes(loop.walk.forward)
     model = loop.walk.creature.model
     points = np.array([corners(model, qpos) for qpos in loop.qpos]) @ axes.T

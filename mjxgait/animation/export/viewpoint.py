@@ -14,29 +14,20 @@ FIELD = np.radians(30.0)
 """The viewer's vertical angle of view."""
 ASPECT = 1.5
 """Smallest width over height of the page's picture."""
-AROUND = 1.4
-"""The same for a body that grew: what is around it shows its motion."""
-AIR = 1.05
-"""Distance of the camera over the smallest one."""
+AROUND = 1.25
+"""Distance of the camera over the smallest one: what is around a body shows its motion."""
 
 
-def viewpoint(loop: WalkLoop, usual: float) -> tuple[np.ndarray, float]:
+def viewpoint(loop: WalkLoop) -> tuple[np.ndarray, float]:
     """Return the point [3] m that the camera looks at, in glTF's axes, and its distance in m.
 
-    usual: distance in units of the creature's size. The camera stands farther away, and looks at
-    the middle of the motion, where some part would leave the picture in one of the page's views.
-    A body that grew has no usual size, and fills the picture.
+    The camera looks at the middle of the motion; in all views of the page, no part leaves the
+    picture.
     """
-    creature, reach = loop.walk.creature, _Reach(loop)
-    target = np.array([0.0, 0.6 * creature.frame.stand_pos[2], 0.0])
-    far = usual * float(creature.model.stat.extent)
-    if not loop.walk.grown and _distance(reach, target) <= far:
-        return target, far
+    reach = _Reach(loop)
     ends = reach.along(np.concatenate([np.eye(3), -np.eye(3)]))
     target = (ends[:3] - ends[3:]) / 2
-    if loop.walk.grown:
-        return target, AROUND * _distance(reach, target)
-    return target, max(far, AIR * _distance(reach, target))
+    return target, AROUND * _distance(reach, target)
 
 
 def _distance(reach: "_Reach", target: np.ndarray) -> float:
