@@ -17,6 +17,9 @@ MAGIC, HEADER, CHUNK = b"glTF", struct.Struct("<4sII"), struct.Struct("<I4s")
 DESCRIPTION, BINARY = b"JSON", b"BIN\0"
 MOST_PARTS = 200_000
 """Largest number of accessors, channels and the like."""
+VERSION = 2
+COMPRESSED = ("KHR_draco_mesh_compression", "KHR_meshopt_compression", "EXT_meshopt_compression")
+"""Extensions without which the numbers of a mesh cannot be read."""
 LISTS = ("nodes", "skins", "meshes", "accessors", "bufferViews", "buffers", "animations")
 DAMAGED = (
     ArithmeticError,
@@ -28,6 +31,11 @@ DAMAGED = (
     struct.error,
 )
 """Errors raised while reading content that does not follow its format."""
+
+
+def damaged(path: Path) -> UserError:
+    """Return the error of a file that is read but makes no sense."""
+    return UserError(f"{path}: its content is damaged; export it again")
 
 
 class Part:
@@ -57,7 +65,9 @@ def open_glb(path: Path) -> Document:
     data = read_bytes(path)
     if len(data) < HEADER.size + CHUNK.size or data[:4] != MAGIC:
         raise UserError(f"{path}: not a GLB file; export as glTF binary (.glb)")
-    stated = HEADER.unpack_from(data)[2]
+    _, version, stated = HEADER.unpack_from(data)
+    if version != VERSION:
+        raise UserError(f"{path}: of version {version} of glTF; export as glTF {VERSION}.0")
     if stated > len(data):
         raise UserError(f"{path}: is cut off: it states more bytes than it has")
     try:
@@ -73,7 +83,32 @@ def open_glb(path: Path) -> Document:
     if any(getattr(buffer, "uri", None) for buffer in whole["buffers"]):
         raise UserError(f"{path}: refers to another file; export as one GLB")
     check_size(path, len(whole["nodes"]), 2)
-    return Document(whole | {"blob": chunks.get(BINARY, b"")})
+    document = Document(whole | {"blob": chunks.get(BINARY, b"")})
+    try:
+        _check_references(path, document)
+    except DAMAGED as error:
+        raise damaged(path) from error
+    return document
+
+
+def _check_references(path: Path, document: Document) -> None:
+    """Refuse compressed meshes, and nodes and skins that name what is not there."""
+    for name in document.extensionsRequired or []:
+        if name in COMPRESSED:
+            raise UserError(f"{path}: its meshes are compressed ({name}); export without that")
+    count = len(document.nodes)
+    groups = {"node": (node.children or [] for node in document.nodes)}
+    groups["skin"] = (skin.joints for skin in document.skins)
+    for kind, members in groups.items():
+        for number, named in enumerate(members):
+            lost = [one for one in named if type(one) is not int or not 0 <= one < count]
+            if lost:
+                raise UserError(
+                    f"{path}: {kind} {number} names node {lost[0]!r}, which is not there; "
+                    "export it again"
+                )
+    if any(not skin.joints for skin in document.skins):
+        raise UserError(f"{path}: has a skin without bones; export the armature with its mesh")
 
 
 def read_chunks(data: bytes) -> dict[bytes, bytes]:

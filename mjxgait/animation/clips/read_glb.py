@@ -18,7 +18,7 @@ from mjxgait.animation.clips.clip import (
     check_size,
     check_times,
 )
-from mjxgait.animation.clips.glb_document import DAMAGED, Document, Part, open_glb
+from mjxgait.animation.clips.glb_document import DAMAGED, Document, Part, damaged, open_glb
 from mjxgait.errors import UserError
 
 TYPES = {
@@ -103,7 +103,7 @@ def read_glb(path: Path) -> Clip:
         names = tuple(name_of(nodes, i) for i in range(len(nodes)))
         note = _note(nodes)
     except DAMAGED as error:
-        raise UserError(f"{path}: its content is damaged ({error!r})") from None
+        raise damaged(path) from error
     if not keys:
         raise UserError(f"{path}: has no animation that turns a bone; export with animations")
     times = _common_times(path, keys)
@@ -189,7 +189,7 @@ def rig_of_glb(path: Path) -> Rig:
     try:
         return _rig(path, document, skin_of(path, document))
     except DAMAGED as error:
-        raise UserError(f"{path}: its content is damaged ({error!r})") from None
+        raise damaged(path) from error
 
 
 def skin_of(path: Path, document: Document) -> int:

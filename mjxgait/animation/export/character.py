@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.clips.clip import read_bytes, written
-from mjxgait.animation.clips.glb_document import DAMAGED, Part, open_glb
+from mjxgait.animation.clips.glb_document import DAMAGED, Part, damaged, open_glb
 from mjxgait.animation.clips.read_glb import name_of, placed, skin_of, worlds
 from mjxgait.errors import UserError
 
@@ -68,7 +68,7 @@ def read_character(path: Path) -> Character:
             bones[name] = (*bones.get(name, ()), joint)
         clips = frozenset(str(animation.name) for animation in document.animations)
     except DAMAGED as error:
-        raise UserError(f"{path}: its content is damaged ({error!r})") from None
+        raise damaged(path) from error
     if not np.isfinite(world).all():
         raise UserError(f"{path}: the place of a node is not a finite number; export it again")
     data, tree = read_bytes(path), (tuple(nodes), tuple(parents), tuple(order))

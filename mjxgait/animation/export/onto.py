@@ -16,7 +16,7 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation
 
-from mjxgait.animation.clips.glb_document import DAMAGED
+from mjxgait.animation.clips.glb_document import DAMAGED, damaged
 from mjxgait.animation.clips.read_glb import name_of
 from mjxgait.animation.export.character import Character
 from mjxgait.animation.export.footfalls import contacts
@@ -81,7 +81,7 @@ def build_onto(
         }
         return _finished(loops, character, bones, fit, tracks, travelling)
     except DAMAGED as error:
-        raise UserError(f"{character.path}: its content is damaged ({error!r})") from None
+        raise damaged(character.path) from error
 
 
 def bones_of(creature: Creature, character: Character) -> dict[str, int]:
