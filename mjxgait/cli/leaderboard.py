@@ -4,15 +4,12 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import tyro
 
 from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
-
-if TYPE_CHECKING:
-    from mjxgait.experiments.leaderboard import Entry
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,23 +40,27 @@ def leaderboard_command(arguments: Sequence[str]) -> int:
     if (options.action == "add") != bool(options.runs):
         raise UserError("mjxgait leaderboard add RUN [RUN ...] adds runs; without both it shows")
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
-    from mjxgait.experiments.leaderboard import add, read_board, table
+    from mjxgait.experiments.leaderboard import read_board, table
 
     if options.runs:
-        add(options.board, [_entry(run, options) for run in options.runs])
+        _add(options)
     entries = read_board(options.board)
     print(table(entries).rstrip() if entries else f"{options.board}: no runs yet")
     return 0
 
 
-def _entry(run: Path, options: LeaderboardOptions) -> "Entry":
+def _add(options: LeaderboardOptions) -> None:
+    """Add each run as soon as it is examined again; refuse what can be refused before that."""
     from mjxgait.api import verify
-    from mjxgait.experiments.leaderboard import entry_of
+    from mjxgait.experiments.leaderboard import add, entry_of, refuse_known
 
-    entry = entry_of(run, options.algorithm, options.machine)
-    if different := verify(run):
-        raise UserError(
-            f"{run}: a second examination differs from its certificate: {different[0]}; "
-            "it was not added"
-        )
-    return entry
+    entries = [entry_of(run, options.algorithm, options.machine) for run in options.runs]
+    refuse_known(options.board, entries)
+    for run, entry in zip(options.runs, entries, strict=True):
+        if different := verify(run):
+            raise UserError(
+                f"{run}: a second examination differs from its certificate: {different[0]}; "
+                "it was not added"
+            )
+        add(options.board, entry)
+        print(f"{run}: {'certified' if entry.certified else 'not certified'}, as before")

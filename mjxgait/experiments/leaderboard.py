@@ -104,11 +104,11 @@ def read_board(board: Path) -> list[Entry]:
     return [Entry(**{n: line[n] for n in names}) for line in read_records(board, Entry)]
 
 
-def add(board: Path, entries: Sequence[Entry]) -> None:
-    """Append entries to a file.
+def refuse_known(board: Path, entries: Sequence[Entry]) -> None:
+    """Refuse entries of which one is in the file already, or twice among them.
 
     Raises:
-      UserError: one of them is there already, or the file is damaged or cannot be written.
+      UserError: that is so, or the file is damaged.
     """
     known = read_board(board)
     for entry in entries:
@@ -117,8 +117,17 @@ def add(board: Path, entries: Sequence[Entry]) -> None:
                 f"{board}: has seed {entry.seed} of {' '.join(entry.group[:3])} already"
             )
         known.append(entry)
+
+
+def add(board: Path, entry: Entry) -> None:
+    """Append an entry to a file.
+
+    Raises:
+      UserError: the file has it already, is damaged, or cannot be written.
+    """
+    refuse_known(board, [entry])
     with writing(board):
-        write_lines(board, map(dataclasses.asdict, known))
+        write_lines(board, map(dataclasses.asdict, [*read_board(board), entry]))
 
 
 def table(entries: Iterable[Entry]) -> str:

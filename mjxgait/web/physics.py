@@ -77,13 +77,14 @@ def build_physics_page(
     height, radius = _extent(shown, creature.stand_qpos)
     far = radius / np.sin(WIDE / 2)
     extent = float(creature.model.stat.extent)
-    glb, apart = build_bodies(creature, shown)
+    afloat = facts["water"] is not None
+    glb, apart = build_bodies(creature, shown, afloat)
     speed = CertificateConfig().pushes.speed * PUSH
     page = {
         "bodies": shown_bodies(shown),
         "apart": apart,
         "extent": extent,
-        "water": facts["water"] is not None,
+        "water": afloat,
         "push": speed * (creature.gravity * creature.frame.hip_height) ** 0.5,
     }
     lead = (

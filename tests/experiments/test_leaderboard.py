@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mjxgait.errors import UserError
-from mjxgait.experiments.leaderboard import Entry, add, read_board, table
+from mjxgait.experiments.leaderboard import Entry, add, read_board, refuse_known, table
 from mjxgait.files import DamagedFile
 
 ONE = Entry(
@@ -30,12 +30,17 @@ BETTER = dataclasses.replace(ONE, seed=2, champion="c2", margin=0.4, evaluations
 def test_runs_are_added_once(tmp_path: Path):
     board = tmp_path / "board.jsonl"
     assert read_board(board) == []
-    add(board, [ONE])
-    add(board, [FAILED, BETTER])
+    for entry in (ONE, FAILED, BETTER):
+        add(board, entry)
     assert read_board(board) == [ONE, FAILED, BETTER]
     with pytest.raises(UserError, match="has seed 1 of stool walk poses already"):
-        add(board, [dataclasses.replace(ONE, seed=7), FAILED])
+        add(board, FAILED)
     assert read_board(board) == [ONE, FAILED, BETTER]
+    new = dataclasses.replace(ONE, seed=7)
+    refuse_known(board, [new])
+    for twice in ([new, FAILED], [new, new]):
+        with pytest.raises(UserError, match="already"):
+            refuse_known(board, twice)
 
 
 def test_a_row_counts_failures_and_has_medians_of_the_certified():
@@ -51,7 +56,7 @@ def test_a_row_counts_failures_and_has_medians_of_the_certified():
 @pytest.mark.parametrize("line", ['{"creature": 1}', "[1]", "not JSON"])
 def test_a_damaged_line_is_named(tmp_path: Path, line: str):
     board = tmp_path / "board.jsonl"
-    add(board, [ONE])
+    add(board, ONE)
     board.write_text(board.read_text() + line + "\n")
     with pytest.raises(DamagedFile, match=r"board\.jsonl, line 2"):
         read_board(board)

@@ -142,6 +142,8 @@ def test_a_swimmer_has_a_light_and_no_floor(browser, tmp_path):
     light = "['cx', 'cy'].map(k => document.querySelector('circle.light').getAttribute(k)).join()"
     before, apart = tab.evaluate(light), shown(tab)["apart"]
     assert apart > 5.0
+    # It has no front: what is counted is how far it is from its start.
+    assert shown(tab)["ahead"] >= 0.0
     tab.keyboard.press("l")
     wait_until(tab, f"{light} !== '{before}'")
     assert shown(tab)["apart"] == pytest.approx(apart, abs=0.5)

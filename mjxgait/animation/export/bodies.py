@@ -9,6 +9,7 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.export.gltf import Buffer, add_tiles
+from mjxgait.animation.export.scenery import add_still_water
 from mjxgait.animation.export.shaped import material_of, shaped
 from mjxgait.animation.export.skeleton import gltf_axes, quaternions
 from mjxgait.animation.export.surface import Surface, geom_surface
@@ -22,10 +23,13 @@ def shown_bodies(model: mujoco.MjModel) -> list[int]:
     return sorted({int(model.geom_bodyid[g]) for g in seen_geoms(model)} - {0})
 
 
-def build_bodies(creature: Creature, model: mujoco.MjModel) -> tuple[bytes, float]:
+def build_bodies(
+    creature: Creature, model: mujoco.MjModel, afloat: bool = False
+) -> tuple[bytes, float]:
     """Return the bytes of the file in the standing pose, and the distance of two tiles in m.
 
-    model: the creature's, with the looks that the file has.
+    model: the creature's, with the looks that the file has. afloat: in water; `floor` holds
+    particles instead of tiles.
     """
     document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
     document.scenes, document.scene = [gltf.Scene(name=creature.name, nodes=[0])], 0
@@ -47,7 +51,10 @@ def build_bodies(creature: Creature, model: mujoco.MjModel) -> tuple[bytes, floa
         document.nodes.append(
             gltf.Node(name=f"body_{body}", mesh=mesh, translation=place, rotation=about)
         )
-    apart = add_tiles(document, buffer, creature.frame.body_length)
+    if afloat:
+        apart = add_still_water(document, buffer, float(model.stat.extent))
+    else:
+        apart = add_tiles(document, buffer, creature.frame.body_length)
     document.scenes[0].nodes = [0]
     document.nodes[0].children = [1, len(document.nodes) - 1]
     buffer.close()

@@ -31,6 +31,9 @@ PASSING, FADE, LEAST = 70, 0.2, 1e-3
 MARK, LAMP = 0.012, 0.07
 """Radius of a mark and of a lamp in body lengths."""
 
+CELL, CELLS, EACH = 0.9, 1, 3
+"""Size in body lengths of a cell of still water, cells to each side of it, and particles in each."""
+
 
 def add_scenery(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop) -> None:
     """Add what passes a walk in place, and its animation: rungs on the floor.
@@ -49,6 +52,26 @@ def add_scenery(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop) -> None:
         document.scenes[0].nodes.append(node)
         every = buffer.add(loop.times.astype(np.float32), bounds=True)
         add_channel(buffer, document.animations[0], every, node, "translation", lamp)
+
+
+def add_still_water(document: gltf.GLTF2, buffer: Buffer, length: float) -> float:
+    """Add a block of particles as the node "floor", without motion.
+
+    length: m of the body. Returns the size of a cell in m: moved by it to any side, the block looks
+    the same.
+    """
+    apart = CELL * length
+    cells = np.stack(np.meshgrid(*[np.arange(-CELLS, CELLS + 1)] * 3), -1).reshape(-1, 1, 3)
+    within = np.random.default_rng(0).uniform(-0.5, 0.5, (EACH, 3))
+    places = (apart * (cells + within)).reshape(-1, 3)
+    first, names = len(document.nodes), [f"mark_{number}" for number in range(len(places))]
+    add_marks(document, buffer, names, MARK * length, water=True)
+    for node, place in zip(document.nodes[first:], places, strict=True):
+        node.translation = place.tolist()
+    children = list(range(first, len(document.nodes)))
+    document.nodes.append(gltf.Node(name="floor", children=children))
+    document.scenes[0].nodes.append(len(document.nodes) - 1)
+    return float(apart)
 
 
 def _add_passing(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop, length: float) -> None:

@@ -95,12 +95,11 @@ function run({ simulation, view, state, page }) {
   requestAnimationFrame(frame);
 }
 
-// m that the trunk is ahead of its start.
-function ahead({ data, facts: { trunk, start } }) {
-  return start.forward.reduce(
-    (sum, value, i) => sum + value * (data.xpos[3 * trunk + i] - start.place[i]),
-    0,
-  );
+// m that the trunk is ahead of its start. A body that grew has no front: m from its start.
+function ahead({ data, facts: { kind, trunk, start } }) {
+  const moved = start.place.map((value, i) => data.xpos[3 * trunk + i] - value);
+  if (kind === "brain") return Math.hypot(...moved);
+  return start.forward.reduce((sum, value, i) => sum + value * moved[i], 0);
 }
 
 // The string's end follows the pointer, at the distance at which the creature was caught.

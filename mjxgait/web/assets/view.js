@@ -33,11 +33,10 @@ export class View {
     const { scene, facts, floor, camera } = this,
       { shadow } = scene,
       reach = facts.extent;
-    floor.visible = !facts.water;
     const dark = matchMedia("(prefers-color-scheme: dark)").matches;
     floor.traverse(part => {
       part.layers.set(1);
-      if (dark) part.material?.color.setScalar(0.12);
+      if (dark && !facts.water) part.material?.color.setScalar(0.12);
     });
     camera.layers.enable(1);
     scene.boundingBox.min.set(-reach, 0, -reach);
@@ -51,8 +50,9 @@ export class View {
   // Draw the present state. follow: whether the camera goes along. seconds: since the last drawing.
   draw(simulation, follow, seconds) {
     const { data, model } = simulation,
-      { trunk } = simulation.facts;
-    const place = this.vector(data.xpos[3 * trunk], data.xpos[3 * trunk + 1], 0);
+      { trunk, start, water } = simulation.facts;
+    const [x, y, z] = data.xpos.slice(3 * trunk, 3 * trunk + 3);
+    const place = this.vector(x, y, water ? z - start.place[2] : 0);
     this.offset ??= place.clone();
     if (follow) this.offset.lerp(place, 1 - Math.exp(-seconds / 0.15));
     for (const [body, node] of this.bodies) {
@@ -65,11 +65,10 @@ export class View {
     this.world.position.copy(this.offset).applyQuaternion(axes).negate();
     // The floor's pattern stays where it is in the world; its patch goes along with the creature.
     const tile = value => this.facts.apart * Math.round(value / this.facts.apart);
-    this.floor.position.set(tile(here.x), 0, tile(here.z)).add(this.world.position);
-    const down = this.vector(...model.opt.gravity)
-      .applyQuaternion(axes)
-      .normalize();
-    this.ground.quaternion.setFromUnitVectors(down, this.vector(0, -1, 0));
+    this.floor.position.set(...here.toArray().map(tile)).add(this.world.position);
+    // Uphill is where gravity does not pull; in water it does not pull at all.
+    const down = this.vector(...model.opt.gravity).applyQuaternion(axes).normalize();
+    if (!water) this.ground.quaternion.setFromUnitVectors(down, this.vector(0, -1, 0));
     const { shadow } = this.scene,
       beside = here.add(this.world.position);
     shadow.position.set(beside.x, 0, beside.z);
