@@ -27,8 +27,8 @@ with atheris.instrument_imports(include=["mjxgait"]):
     from mjxgait.controllers.expressions.text import Terminal
     from mjxgait.controllers.expressions.written import MOST_NODES
     from mjxgait.errors import UserError
-    from mjxgait.importer.convert import read_source
     from mjxgait.importer.notes import Notes
+    from mjxgait.importer.read import read_source
     from mjxgait.processes import python_command
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -78,12 +78,14 @@ def corners() -> tuple[np.ndarray, np.ndarray]:
 def lit(scene: bpy.types.Scene) -> None:
     """Add a floor, a sun and a sky; render on the processor, which needs no display."""
     scene.world = bpy.data.worlds.new("world")
+    scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = SKY
     sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
     sun.data.energy, sun.rotation_euler = 3.0, (0.6, 0.3, 0.4)
     scene.collection.objects.link(sun)
     bpy.ops.mesh.primitive_plane_add(size=200.0)
     floor = bpy.data.materials.new("floor")
+    floor.use_nodes = True
     floor.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = FLOOR
     bpy.context.object.data.materials.append(floor)
     scene.render.engine, scene.cycles.samples = "CYCLES", SAMPLES

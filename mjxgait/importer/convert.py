@@ -2,23 +2,18 @@
 
 import dataclasses
 import math
-import xml.etree.ElementTree as ET
-from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from mjxgait.animation.clips.clip import ELSEWHERE
 from mjxgait.creature import geometry
 from mjxgait.creature.settings import RigSettings
 from mjxgait.errors import UserError
-from mjxgait.files import read_bytes
-from mjxgait.importer.anatomy import in_plane
+from mjxgait.importer.anatomy import Anatomy, in_plane
 from mjxgait.importer.balance import steady_balance
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.bones import add_bones
-from mjxgait.importer.clean import clean_mjcf, clean_urdf
 from mjxgait.importer.drive import step_if_narrow, swing_arms
 from mjxgait.importer.find import find_anatomy
 from mjxgait.importer.notes import Notes, listed, one_line, plain_names, tell_dropped, tell_left_out
@@ -28,9 +23,9 @@ from mjxgait.importer.orient import (
     is_planar,
     yaw_to,
 )
-from mjxgait.importer.rigged import RIGS, model_of
+from mjxgait.importer.read import source_of
 from mjxgait.importer.robots import find_robot, robot_name
-from mjxgait.importer.source import MOST_XML, Places, Source, parse_text, parse_xml
+from mjxgait.importer.source import Source
 from mjxgait.importer.spec import add_joints, creature_xml, place_bodies
 from mjxgait.importer.stance import stance_of
 from mjxgait.importer.standing import (
@@ -47,7 +42,6 @@ from mjxgait.importer.worker import (
     compile_here,
 )
 from mjxgait.importer.write_toml import GAIT, creature_toml
-from mjxgait.importer.xacro import TEMPLATE, expanded
 
 XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
 """Files of a creature folder that an import makes."""
@@ -124,17 +118,8 @@ def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
 
 
 def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
-    source = _read(path, choices, notes)
-    parts = source.tree, source.assets, source.missing
-    if choices.apart:
-        model, changes = compile_apart(*parts, choices.seconds, choices.gigabytes)
-    else:
-        model, changes = compile_here(*parts)
-    for what, why in changes:
-        for key, file in source.files.items():
-            what = what.replace(f"({key})", f'"{file}"')
-        notes.change(what, why)
-    tell_dropped(model, notes)
+    source = source_of(path, choices.search, choices.up, choices.height, notes)
+    model = _compiled(source, choices, notes)
     up = source.up.value if source.up else choices.up
     anatomy = find_anatomy(
         model, source.coupled, choices.keep, choices.freeze, up, notes, source.limbs
@@ -155,33 +140,58 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     best = standing(
         kinematics, offered_poses(kinematics, model, anatomy, source, start), mirror, planar, notes
     )
-    if best.held.height < 0:
-        raise UserError(
-            f'"{model.body(anatomy.root).name}" lies on the floor, and all of it that is not a foot '
-            "falls through: this has no legs to walk on"
-        )
-    soles = {name for foot in best.feet for name in foot}
-    steady_balance(
-        best.drive, best.kinematics.names, best.kinematics.model, best.qpos, soles, best.notes
-    )
-    if source.bones and not planar:
-        step_if_narrow(best.kinematics, best.q, best.drive, best.notes)
-        swing_arms(best.kinematics, best.drive, source.swings, best.notes)
-    name = (
-        plain_names([choices.name or path.stem.removesuffix(".urdf")], ["creature"])[0].strip(".-")
-        or "creature"
-    )
+    _balance(best, source, model.body(anatomy.root).name, planar)
     if rest is not None:
         rest[:3] = best.qpos[:3]
+    rig = _rig(path, source, model, anatomy)
+    return _folder(_name(path, choices), rig, best, mirror, planar, rest)
+
+
+def _compiled(source: Source, choices: ImportChoices, notes: Notes) -> mujoco.MjModel:
+    """MuJoCo's model of a source; tells what it changed or dropped."""
+    parts = source.tree, source.assets, source.missing
+    if choices.apart:
+        model, changes = compile_apart(*parts, choices.seconds, choices.gigabytes)
+    else:
+        model, changes = compile_here(*parts)
+    for what, why in changes:
+        for key, file in source.files.items():
+            what = what.replace(f"({key})", f'"{file}"')
+        notes.change(what, why)
+    tell_dropped(model, notes)
+    return model
+
+
+def _balance(best: Candidate, source: Source, root: str, planar: bool) -> None:
+    """Set how the body balances and steps, and how arms swing; refuse one that lies on the floor."""
+    if best.held.height < 0:
+        raise UserError(
+            f'"{root}" lies on the floor, and all of it that is not a foot falls through: this has '
+            "no legs to walk on"
+        )
+    soles = {name for foot in best.feet for name in foot}
+    body = best.kinematics
+    steady_balance(best.drive, body.names, body.model, best.qpos, soles, best.notes)
+    if source.bones and not planar:
+        step_if_narrow(body, best.q, best.drive, best.notes)
+        swing_arms(body, best.drive, source.swings, best.notes)
+
+
+def _name(path: Path, choices: ImportChoices) -> str:
+    """Name of the creature."""
+    plain = plain_names([choices.name or path.stem.removesuffix(".urdf")], ["creature"])[0]
+    return plain.strip(".-") or "creature"
+
+
+def _rig(path: Path, source: Source, model: mujoco.MjModel, anatomy: Anatomy) -> RigSettings:
+    """The file, its bones by part, and the parts that hang; no bones for what is no skeleton."""
     bones = {
         body.name: source.bones[model.body(b).name]
         for body, b in zip(anatomy.spec.bodies[1:], anatomy.bodies, strict=True)
         if source.bones
     }
     turned = {part: _rounded(geometry.quaternion(turn)) for part, turn in source.turned.items()}
-    origin = one_line(path.name)
-    rig = RigSettings(origin, bones, turned)
-    return _folder(name, origin, best, mirror, planar, rest, rig)
+    return RigSettings(one_line(path.name), bones, turned)
 
 
 def _rounded(quat: np.ndarray) -> tuple[float, float, float, float]:
@@ -189,111 +199,61 @@ def _rounded(quat: np.ndarray) -> tuple[float, float, float, float]:
     return w, x, y, z
 
 
-def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
-    """Read a model file, or build the tree of a skeleton."""
-    kind = path.suffix.lower()
-    if kind in ELSEWHERE:
-        raise UserError(f'{path}: cannot read "{kind}"; {ELSEWHERE[kind]}')
-    if kind not in RIGS:
-        if choices.height is not None:
-            raise UserError(
-                f"--height is for skeletons ({', '.join(RIGS)}); {path} has its lengths"
-            )
-        return read_source(path, choices.search, notes)
-    return model_of(path, choices.up, choices.height, notes)
-
-
-def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:
-    """Read and clean the tree of a file.
-
-    Raises:
-      UserError: it cannot be read, or is neither MJCF nor URDF.
-    """
-    source, places = Source(_parsed(path, search)), Places(path, search)
-    match source.tree.tag:
-        case "mujoco":
-            clean_mjcf(source, path, places, notes)
-        case "robot":
-            clean_urdf(source, path, places, notes)
-        case other:
-            raise UserError(
-                f"{path}: begins with <{other[:40]}>; a model file begins with <mujoco> (MJCF) or <robot> (URDF)"
-            )
-    return source
-
-
-def _parsed(path: Path, search: Sequence[Path]) -> ET.Element:
-    if path.suffix.lower() == TEMPLATE:
-        read_bytes(path, MOST_XML)
-        return parse_text(expanded(path, search), path)
-    return parse_xml(path)
-
-
 def _folder(
     name: str,
-    origin: str,
+    rig: RigSettings,
     best: Candidate,
     mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
     rest: np.ndarray | None,
-    rig: RigSettings,
 ) -> Imported:
     """Write the texts of the folder.
 
-    rest: [nq] rest pose of a skeleton, None for other models. rig: its bones, none for others.
+    rig: the file, and its bones, none for others. rest: [nq] rest pose of a skeleton, None for
+    other models.
     """
     kinematics, notes = best.kinematics, best.notes
-    notes.guess("trunk", kinematics.bodies[0].name, "high", "the body that all limbs hang on")
-    notes.guess(
-        "feet",
-        f"{len(best.feet)} feet",
-        "high" if math.isfinite(best.held.up) and best.held.stands else "low",
-        "limbs that end lowest",
-    )
+    _tell(best)
     pairs = {} if mirror is None else _stated_pairs(kinematics, best.q, mirror, planar)
-    if stopped := [joint.name for joint in kinematics.joints if joint.limited == 1]:
-        notes.change(
-            f"limits act on {listed(stopped)} only",
-            "these stand at the end of their range and rest on it",
-        )
     kinematics.pose(best.q)
     passing = planar and bool(geometry.parallel(kinematics.data.xaxis[1:]).all())
     is_rig = bool(rig.bones)
-    hip, length = _sizes(best, is_rig)
-    shorter = length < hip
-    if is_rig and not shorter:
-        why = "from the hindmost to the foremost leg: tails and necks do not count"
-        notes.guess("body_length", f"{length:.3g}", "medium", why)
-    if shorter:
-        # Speeds count in body lengths: a biped measured from its back to its toes would score well
-        # for shuffling.
-        length = hip
-        why = "the hip height: the body is shorter than its legs, and speeds count in it"
-        notes.guess("body_length", f"{hip:.3g}", "medium", why)
+    hip, length, stated = _sizes(best, is_rig)
     if is_rig and len(best.feet) in NATURAL:
         why = "of random poses of its many joints few stand; --gait auto leaves it open"
         notes.guess(GAIT, "natural", "medium", why)
     train = _train(best, mirror is not None, hip, length, is_rig)
     toml = creature_toml(
         name,
-        origin,
+        rig.file,
         best,
         mirror is not None,
         pairs,
-        length if shorter or is_rig else None,
+        length if stated else None,
         passing,
         rig,
         train,
     )
     report = (
-        f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
+        f"# {name}\n\nMade by `mjxgait import` from {rig.file}.\n\n```text\n{notes.text()}\n```\n"
     )
-    files = {
-        XML: creature_xml(kinematics.spec, name, best.qpos, rest),
-        TOML: toml,
-        README: report,
-    }
-    return Imported(name, files, notes, best.held.stands)
+    xml = creature_xml(kinematics.spec, name, best.qpos, rest)
+    return Imported(name, {XML: xml, TOML: toml, README: report}, notes, best.held.stands)
+
+
+def _tell(best: Candidate) -> None:
+    """Report trunk, feet, and joints that rest on a stop."""
+    kinematics, notes = best.kinematics, best.notes
+    notes.guess("trunk", kinematics.bodies[0].name, "high", "the body that all limbs hang on")
+    sure = math.isfinite(best.held.up) and best.held.stands
+    notes.guess(
+        "feet", f"{len(best.feet)} feet", "high" if sure else "low", "limbs that end lowest"
+    )
+    if stopped := [joint.name for joint in kinematics.joints if joint.limited == 1]:
+        notes.change(
+            f"limits act on {listed(stopped)} only",
+            "these stand at the end of their range and rest on it",
+        )
 
 
 def _stated_pairs(
@@ -314,9 +274,11 @@ def _stated_pairs(
     }
 
 
-def _sizes(best: Candidate, between_legs: bool) -> tuple[float, float]:
-    """Hip height and body length in m in the standing pose.
+def _sizes(best: Candidate, between_legs: bool) -> tuple[float, float, bool]:
+    """Hip height and body length in m in the standing pose, and whether the length is stated.
 
+    Speeds count in body lengths: a biped measured from its back to its toes would score well for
+    shuffling. So it is no shorter than its legs.
     between_legs: whether only the trunk between the legs, and they, count.
     """
     model, data = best.kinematics.model, mujoco.MjData(best.kinematics.model)
@@ -325,7 +287,17 @@ def _sizes(best: Candidate, between_legs: bool) -> tuple[float, float]:
     legs = {b for group in best.kinematics.feet for b in geometry.ancestors(model, group[0] + 1)}
     counted = legs if between_legs else None
     length = geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]), counted)
-    return stance_of(best.kinematics, best.qpos[7:]).hip, length
+    hip = stance_of(best.kinematics, best.qpos[7:]).hip
+    why = "from the hindmost to the foremost leg: tails and necks do not count"
+    if length < hip:
+        length, why = (
+            hip,
+            "the hip height: the body is shorter than its legs, and speeds count in it",
+        )
+    elif not between_legs:
+        return hip, length, False
+    best.notes.guess("body_length", f"{length:.3g}", "medium", why)
+    return hip, length, True
 
 
 def _train(best: Candidate, symmetric: bool, hip: float, length: float, skeleton: bool) -> Settings:
