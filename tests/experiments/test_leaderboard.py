@@ -60,3 +60,9 @@ def test_a_damaged_line_is_named(tmp_path: Path, line: str):
     board.write_text(board.read_text() + line + "\n")
     with pytest.raises(DamagedFile, match=r"board\.jsonl, line 2"):
         read_board(board)
+
+
+def test_the_docs_show_the_shipped_board():
+    docs = Path(__file__).parents[2] / "docs"
+    page = (docs / "research" / "results.md").read_text(encoding="utf-8")
+    assert table(read_board(docs / "data" / "leaderboard.jsonl")) in page
