@@ -7,7 +7,7 @@ from mjxgait.config.schema import Config
 from mjxgait.controllers.key_poses.config import unhurried
 from mjxgait.importer.notes import Confidence, Notes
 from mjxgait.tasks.walk.config import WalkConfig
-from mjxgait.tasks.walk.gaits import stride_limit
+from mjxgait.tasks.walk.gaits import stride_limit, transition
 
 STARTS, ALIVE = 6, 6.0
 """Evaluated trials, and weight of staying up to the end, of bodies that must step to catch a fall.
@@ -21,7 +21,11 @@ BRISK = 1.2
 STRIDE = 0.7
 """Target stride length at that speed, in hip heights."""
 LEAST = 0.5
-"""Least stride length of the certificate in hip heights: a cycle of shorter strides is a buzz."""
+"""Least stride length of the certificate in hip heights: a cycle of shorter strides is a buzz.
+
+Nor is a cycle shorter than that of an animal of this mass that changes to a gallop: heavy bodies
+would run at the shortest one.
+"""
 
 LEAPING, RISES = 1.6, 8
 """Target hopping speed in body lengths per second of one-legged bodies, and hardening steps.
@@ -47,6 +51,10 @@ SMALLER = 0.03
 ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
+LONG, CROSSED = 14.0, 12.0
+"""s, episode of a character on one foot or two: in the usual 8 s it speeds up and does not yet fall.
+Weight of parts within each other, three times the default: its thick thighs and tail are close.
+"""
 FLICKER, LEISURE = 3.0, 0.65
 """Weight of feet that lose the floor for moments, of characters on more than two feet: their mass
 rests on small paws and hooves, which shake. And their target speed in body lengths per second: at
@@ -85,8 +93,9 @@ class Traits:
         return self.rotor > self.mass * self.hip**2
 
     def steps_between_poses(self, speed: float) -> int:
-        """Steps between poses that avoid too short strides at this speed in body lengths/s."""
-        return unhurried(LEAST * self.hip / (speed * self.length), self.time_step)
+        """Steps between poses that avoid too short or hasty strides at a speed in body lengths/s."""
+        shortest = max(LEAST * self.hip / (speed * self.length), 1 / transition(self.mass))
+        return unhurried(shortest, self.time_step)
 
 
 def train_table(body: Traits, notes: Notes) -> Settings:
@@ -97,7 +106,11 @@ def train_table(body: Traits, notes: Notes) -> Settings:
         settings, told = many_hinges(body)
     else:
         settings, told = four_feet(body)
-    if body.skeleton and not body.steps:
+    if body.skeleton and body.steps:
+        settings["rollout"]["seconds"] = LONG
+        settings["fitness"]["weights"]["overlap"] = CROSSED
+        told = (f"{told[0]}; episodes of {LONG:g} s; parts within each other cost", *told[1:])
+    elif body.skeleton:
         settings["fitness"]["speed"] = LEISURE
         settings["fitness"]["weights"]["patter"] = FLICKER
         told = (f"{told[0]}; feet that flicker cost; {LEISURE:g} body lengths/s", *told[1:])
