@@ -51,9 +51,9 @@ SMALLER = 0.03
 ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
-LONG, CROSSED = 14.0, 12.0
+LONG, CROSSED = 14.0, 24.0
 """s, episode of a character on one foot or two: in the usual 8 s it speeds up and does not yet fall.
-Weight of parts within each other, three times the default: its thick thighs and tail are close.
+Weight of parts within each other, six times the default: its thick thighs and tail are close.
 """
 FLICKER, LEISURE = 3.0, 0.65
 """Weight of feet that lose the floor for moments, of characters on more than two feet: their mass
