@@ -52,10 +52,10 @@ def leaderboard_command(arguments: Sequence[str]) -> int:
 def _add(options: LeaderboardOptions) -> None:
     """Add each run as soon as it is examined again; refuse what can be refused before that."""
     from mjxgait.api import verify
-    from mjxgait.experiments.leaderboard import add, entry_of, refuse_known
+    from mjxgait.experiments.leaderboard import add, entry_of, with_new
 
     entries = [entry_of(run, options.algorithm, options.machine) for run in options.runs]
-    refuse_known(options.board, entries)
+    with_new(options.board, entries)
     for run, entry in zip(options.runs, entries, strict=True):
         if different := verify(run):
             raise UserError(

@@ -104,11 +104,11 @@ def read_board(board: Path) -> list[Entry]:
     return [Entry(**{n: line[n] for n in names}) for line in read_records(board, Entry)]
 
 
-def refuse_known(board: Path, entries: Sequence[Entry]) -> None:
-    """Refuse entries of which one is in the file already, or twice among them.
+def with_new(board: Path, entries: Iterable[Entry]) -> list[Entry]:
+    """Return the entries of a file, and new ones.
 
     Raises:
-      UserError: that is so, or the file is damaged.
+      UserError: one of them is in the file already, or twice among them, or the file is damaged.
     """
     known = read_board(board)
     for entry in entries:
@@ -117,6 +117,7 @@ def refuse_known(board: Path, entries: Sequence[Entry]) -> None:
                 f"{board}: has seed {entry.seed} of {' '.join(entry.group[:3])} already"
             )
         known.append(entry)
+    return known
 
 
 def add(board: Path, entry: Entry) -> None:
@@ -125,9 +126,9 @@ def add(board: Path, entry: Entry) -> None:
     Raises:
       UserError: the file has it already, is damaged, or cannot be written.
     """
-    refuse_known(board, [entry])
+    entries = with_new(board, [entry])
     with writing(board):
-        write_lines(board, map(dataclasses.asdict, [*read_board(board), entry]))
+        write_lines(board, map(dataclasses.asdict, entries))
 
 
 def table(entries: Iterable[Entry]) -> str:

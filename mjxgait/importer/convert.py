@@ -225,7 +225,6 @@ def _folder(
     train = _train(best, mirror is not None, hip, length, is_rig)
     toml = creature_toml(
         name,
-        rig.file,
         best,
         mirror is not None,
         pairs,

@@ -21,11 +21,7 @@ BRISK = 1.2
 STRIDE = 0.7
 """Target stride length at that speed, in hip heights."""
 LEAST = 0.5
-"""Least stride length of the certificate in hip heights: a cycle of shorter strides is a buzz.
-
-Nor is a cycle shorter than that of an animal of this mass that changes to a gallop: heavy bodies
-would run at the shortest one.
-"""
+"""Least stride length of the certificate in hip heights: a cycle of shorter strides is a buzz."""
 
 LEAPING, RISES = 1.6, 8
 """Target hopping speed in body lengths per second of one-legged bodies, and hardening steps.
@@ -93,7 +89,11 @@ class Traits:
         return self.rotor > self.mass * self.hip**2
 
     def steps_between_poses(self, speed: float) -> int:
-        """Steps between poses that avoid too short or hasty strides at a speed in body lengths/s."""
+        """Steps between poses that avoid too short or hasty strides at a speed in body lengths/s.
+
+        An animal of this mass gallops sooner than it takes hastier ones. Heavy bodies would run at
+        the shortest cycle.
+        """
         shortest = max(LEAST * self.hip / (speed * self.length), 1 / transition(self.mass))
         return unhurried(shortest, self.time_step)
 

@@ -18,7 +18,6 @@ GAIT = "gait"
 
 def creature_toml(
     name: str,
-    origin: str,
     best: Candidate,
     symmetric: bool,
     pairs: Mapping[str, tuple[str, int]],
@@ -30,10 +29,10 @@ def creature_toml(
     """Return the text of creature.toml.
 
     Args:
-      origin: the model file's name, in one line. best: the creature in its standing pose. pairs:
-        stated mirror pairs, joint to partner and sign. body_length: m, None if the loader measures
-        it. planar: whether its legs are in one plane and pass each other. rig: of a skeleton.
-        train: settings that differ from the defaults.
+      best: the creature in its standing pose. pairs: stated mirror pairs, joint to partner and
+        sign. body_length: m, None if the loader measures it. planar: whether its legs are in one
+        plane and pass each other. rig: the model file, and the bones of a skeleton. train: settings
+        that differ from the defaults.
     """
     joints, drive, notes = best.kinematics.names, best.drive, best.notes
     root = best.kinematics.bodies[0]
@@ -42,12 +41,12 @@ def creature_toml(
     remark = {
         guess.what: f"  # {guess.confidence}: {one_line(guess.reason)}" for guess in notes.guesses
     }
-    about = f"imported from {origin}: {len(joints)} joints"
+    about = f"imported from {rig.file}: {len(joints)} joints"
     lines = [
-        f"# Made by `mjxgait import` from {origin}. The words after each guess say how sure it is; "
+        f"# Made by `mjxgait import` from {rig.file}. The words after each guess say how sure it is; "
         "change what is wrong.",
         "# `mjxgait check` draws it. Mass, inertias, joint axes and positions in creature.xml are "
-        f"those of {origin}.",
+        f"those of {rig.file}.",
         "[creature]",
         f"name = {_quoted(name)}",
         f"description = {_quoted(about)}",

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mjxgait.errors import UserError
-from mjxgait.experiments.leaderboard import Entry, add, read_board, refuse_known, table
+from mjxgait.experiments.leaderboard import Entry, add, read_board, table, with_new
 from mjxgait.files import DamagedFile
 
 ONE = Entry(
@@ -37,10 +37,10 @@ def test_runs_are_added_once(tmp_path: Path):
         add(board, FAILED)
     assert read_board(board) == [ONE, FAILED, BETTER]
     new = dataclasses.replace(ONE, seed=7)
-    refuse_known(board, [new])
+    assert with_new(board, [new]) == [ONE, FAILED, BETTER, new]
     for twice in ([new, FAILED], [new, new]):
         with pytest.raises(UserError, match="already"):
-            refuse_known(board, twice)
+            with_new(board, twice)
 
 
 def test_a_row_counts_failures_and_has_medians_of_the_certified():

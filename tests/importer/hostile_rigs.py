@@ -1,40 +1,30 @@
 """Skinned files with something wrong or odd about them: the dog of `rigs.py`, changed."""
 
 import json
-import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from importer.rigs import glb
 
+from mjxgait.animation.clips.glb_document import BINARY, DESCRIPTION, read_chunks
+from mjxgait.animation.export.gltf import joined
+
 Document = dict[str, Any]
 Change = Callable[[Document, bytearray], object]
-
-HEAD, CHUNK = 12, 8
 
 
 def opened(data: bytes) -> tuple[Document, bytearray]:
     """The description of a GLB file, and its numbers."""
-    size = struct.unpack_from("<I", data, HEAD)[0]
-    start = HEAD + CHUNK
-    return json.loads(data[start : start + size]), bytearray(data[start + size + CHUNK :])
-
-
-def closed(document: Document, numbers: bytes) -> bytes:
-    """A GLB file of a description and numbers."""
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
-    chunks += struct.pack("<II", len(numbers), 0x004E4942) + numbers
-    return struct.pack("<III", 0x46546C67, 2, HEAD + len(chunks)) + chunks
+    chunks = read_chunks(data)
+    return json.loads(chunks[DESCRIPTION]), bytearray(chunks[BINARY])
 
 
 def changed(change: Change) -> bytes:
     """The dog's file after a change."""
     document, numbers = opened(glb())
     change(document, numbers)
-    return closed(document, bytes(numbers))
+    return joined({DESCRIPTION: json.dumps(document).encode(), BINARY: bytes(numbers)})
 
 
 def node(document: Document, name: str) -> Document:

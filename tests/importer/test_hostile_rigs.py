@@ -27,6 +27,12 @@ def test_a_damaged_rig_is_one_sentence(tmp_path: Path, change: Change, words: st
     assert "\n" not in str(raised.value)
 
 
+def test_another_version_of_the_format_is_refused(tmp_path: Path):
+    data = glb()
+    with pytest.raises(UserError, match=r"of version 1 of glTF; export as glTF 2\.0"):
+        read(tmp_path, data[:4] + b"\1" + data[5:])
+
+
 @pytest.mark.parametrize("change", ODD.values(), ids=ODD)
 def test_an_odd_rig_has_the_skeleton_of_a_plain_one(tmp_path: Path, change: Change):
     """Its bones are as long, in the same order."""

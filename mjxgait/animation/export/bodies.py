@@ -23,9 +23,7 @@ def shown_bodies(model: mujoco.MjModel) -> list[int]:
     return sorted({int(model.geom_bodyid[g]) for g in seen_geoms(model)} - {0})
 
 
-def build_bodies(
-    creature: Creature, model: mujoco.MjModel, afloat: bool = False
-) -> tuple[bytes, float]:
+def build_bodies(creature: Creature, model: mujoco.MjModel, afloat: bool) -> tuple[bytes, float]:
     """Return the bytes of the file in the standing pose, and the distance of two tiles in m.
 
     model: the creature's, with the looks that the file has. afloat: in water; `floor` holds

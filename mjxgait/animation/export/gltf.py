@@ -16,6 +16,7 @@ from mjxgait.animation.clips.glb_document import (
     DESCRIPTION,
     HEADER,
     MAGIC,
+    VERSION,
     read_chunks,
 )
 from mjxgait.animation.export.loop import WalkLoop
@@ -139,17 +140,17 @@ def added(data: bytes, buffer: Buffer, nodes: Mapping[int, Mapping[str, Any]]) -
         merged = whole["nodes"][number] | change
         whole["nodes"][number] = {key: value for key, value in merged.items() if value is not None}
     text = json.dumps(whole, separators=(",", ":")).encode()
-    return _joined({DESCRIPTION: text, BINARY: bytes(blob)} | chunks)
+    return joined({DESCRIPTION: text, BINARY: bytes(blob)} | chunks)
 
 
-def _joined(chunks: Mapping[bytes, bytes]) -> bytes:
-    """A file of chunks, each filled up to whole words: JSON with blanks."""
+def joined(chunks: Mapping[bytes, bytes]) -> bytes:
+    """Return a file of chunks, each filled up to whole words: JSON with blanks."""
     parts = []
     for kind, content in chunks.items():
         filled = content + (b" " if kind == DESCRIPTION else b"\0") * (-len(content) % 4)
         parts.append(CHUNK.pack(len(filled), kind) + filled)
     body = b"".join(parts)
-    return HEADER.pack(MAGIC, 2, HEADER.size + len(body)) + body
+    return HEADER.pack(MAGIC, VERSION, HEADER.size + len(body)) + body
 
 
 APART, DEEP, WIDE = 0.35, 0.06, 0.9

@@ -66,7 +66,7 @@ export class View {
     // The floor's pattern stays where it is in the world; its patch goes along with the creature.
     const tile = value => this.facts.apart * Math.round(value / this.facts.apart);
     this.floor.position.set(...here.toArray().map(tile)).add(this.world.position);
-    // Uphill is where gravity does not pull; in water it does not pull at all.
+    // The ground is level where gravity says; in water there is none.
     const down = this.vector(...model.opt.gravity).applyQuaternion(axes).normalize();
     if (!water) this.ground.quaternion.setFromUnitVectors(down, this.vector(0, -1, 0));
     const { shadow } = this.scene,
