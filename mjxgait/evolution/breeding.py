@@ -1,11 +1,11 @@
-"""Selection of parents, children born in order, lineages, and duplicates.
+"""Selection of parents, and children born in order.
 
 Sequential breeding follows the thesis: "Two parent genomes were chosen randomly from the population
 and their pose combinations were permuted to produce unique children. The parents and children were
 all returned into the population" (Wilson, 3.5). A child may have an elder sibling as its parent,
 and each child differs from every genome before it.
 
-Letters: `P` population, `M` offspring, `N` all of them; `R`, `F` trials and terms.
+Letters: `P` population, `M` offspring.
 """
 
 import dataclasses
@@ -15,8 +15,7 @@ import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.traced import Choice, chosen
-from mjxgait.evolution.state import NOBODY, EvolutionState, Proposal
-from mjxgait.evolution.variation import Variation, first_occurrence
+from mjxgait.evolution.variation import Variation
 from mjxgait.types import Tree
 
 TRIES = 16
@@ -142,75 +141,3 @@ def _holds(pool: object, size: jax.Array, genome: object) -> jax.Array:
 
 def _either(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), yes, no)
-
-
-def families(state: EvolutionState, mothers: jax.Array | None) -> jax.Array | None:
-    """Return the lineages [P + M] of the old and the offspring; None where they are not recorded.
-
-    mothers: [M] places of the offspring's; an offspring without a mother begins a lineage.
-    """
-    if state.family is None or mothers is None:
-        return None
-    population, offspring = len(state.family), len(mothers)
-    own = population + (state.generation + 2) * offspring + jnp.arange(offspring)
-    theirs = state.family[jnp.maximum(mothers, 0)]
-    return jnp.append(state.family, jnp.where(mothers == NOBODY, own, theirs))
-
-
-def place_in_family(family: jax.Array, rank: jax.Array, counts: jax.Array) -> jax.Array:
-    """Count [N] the counted members of its lineage that are before each, by rank [N] among all."""
-    before = rank[:, None] > rank
-    return jnp.sum(before & (family[:, None] == family) & counts, axis=1)
-
-
-def with_share(
-    family: jax.Array, most: int, tier: jax.Array, fitness: jax.Array, counts: jax.Array
-) -> jax.Array:
-    """Raise the tier [N] of the first `most` counted members of each lineage above all others.
-
-    An old individual of another lineage thus survives before one more of a lineage that has its
-    share.
-    """
-    rank = jnp.argsort(jnp.lexsort((-fitness, -tier)))
-    return tier + 2 * (counts & (place_in_family(family, rank, counts) < most))
-
-
-def first_of_kind(
-    same: str,
-    variation: Variation,
-    state: EvolutionState,
-    proposal: Proposal,
-    verdicts: jax.Array,
-    anew: jax.Array,
-) -> jax.Array:
-    """Tell for each of the old and the offspring [P + M] whether it is the first of its kind.
-
-    An individual evaluated again comes before its old self. Of equal results, a child comes before
-    its parent, so that neutral mutations drift.
-
-    Args:
-      same: definition of a copy, `evolution.same`. verdicts: [M, R, F] terms of this round alone;
-        an individual without any is never first. anew: [] whether the first of the offspring are
-        old ones.
-    """
-    old, new = state.genomes, proposal.offspring
-    itself = _new_first(old, new)
-    by_genome = jnp.where(anew, itself, first_occurrence(together(old, new)))
-    if same == "genome":
-        return by_genome
-    of_old, of_new = state.terms, verdicts
-    worth: tuple[object, object] = of_old, of_new
-    if variation.price is not None:
-        worth = (of_old, variation.price(old)), (of_new, variation.price(new))
-    evaluated = jnp.isfinite(together(of_old, of_new)).all((1, 2))
-    return jnp.where(state.forced, by_genome, _new_first(*worth) & evaluated & (itself | ~anew))
-
-
-def together(old: Tree, new: Tree) -> Tree:
-    """Concatenate leaves [P, ...] and [M, ...] to [P + M, ...]."""
-    return jax.tree.map(lambda a, b: jnp.concatenate([a, b]), old, new)
-
-
-def _new_first(old: object, new: object) -> jax.Array:
-    """Tell for each of both [P + M] whether it is the first of its kind, the new before the old."""
-    return jnp.roll(first_occurrence(together(new, old)), len(jax.tree.leaves(old)[0]))

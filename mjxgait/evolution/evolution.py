@@ -13,8 +13,6 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.config.traced import chosen
-from mjxgait.evolution.breeding import families, first_of_kind, together, with_share
 from mjxgait.evolution.offspring import children, forced, pick_rows
 from mjxgait.evolution.state import (
     NOBODY,
@@ -22,11 +20,11 @@ from mjxgait.evolution.state import (
     GenerationMetrics,
     Origin,
     Proposal,
-    admitted,
     decided,
     metrics,
 )
 from mjxgait.evolution.strategy import Normal, SeparableCma
+from mjxgait.evolution.survival import Survival, pooled, together
 from mjxgait.evolution.variation import Variation
 from mjxgait.types import Evaluation
 
@@ -135,9 +133,11 @@ class Evolution:
         seeding = self._seeding(state)
         recalled, rounds = self._recalled(state, evaluation)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
-        grown, mothers = self._survive(
-            state, proposal, recalled, evaluation.terms, rounds, generation
-        )
+        pool = pooled(state, proposal, recalled, rounds)
+        fitness = self._fitness(pool.genomes, pool.terms, generation)
+        again, now = self._again(state)
+        survival = Survival(self.config, self.variation, now if again else None, self._stay(state))
+        grown, mothers = survival.survivors(state, proposal, pool, fitness, evaluation.terms)
         planted = self._plant(state, proposal, evaluation, generation)
         state = jax.tree.map(
             lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
@@ -284,74 +284,6 @@ class Evolution:
             fitness=fitness[kept],
             seeded=seeded.astype(jnp.int32),
         )
-
-    def _survive(
-        self,
-        state: EvolutionState,
-        proposal: Proposal,
-        evaluation: Evaluation,
-        verdicts: jax.Array,
-        rounds: jax.Array | None,
-        generation: jax.Array,
-    ) -> tuple[EvolutionState, jax.Array | None]:
-        """Return the P best of the grown population, without duplicates, and their mothers' places.
-
-        In a forced generation, offspring that are fit enough go before the old. verdicts: [M, R, F]
-        of this round alone.
-        """
-        count = self.config.population
-        pool = together(
-            (state.genomes, state.terms, state.outcome, state.born, state.origin, state.rounds),
-            (
-                proposal.offspring,
-                evaluation.terms,
-                evaluation.outcome,
-                proposal.born,
-                proposal.origin,
-                rounds,
-            ),
-        )
-        fitness = self._fitness(pool[0], pool[1], generation)
-        fresh = jnp.arange(fitness.shape[0]) >= count
-        again, now = self._again(state)
-        anew = now if again else jnp.zeros((), bool)
-        first = first_of_kind(self.config.same, self.variation, state, proposal, verdicts, anew)
-        distinct = first | jnp.logical_not(self.config.remove_duplicates)
-        young = jnp.arange(fitness.shape[0]) >= count + self.config.elites
-        taken_in = admitted(self.config, state, fitness, young & distinct)
-        stay = self._stay(state)
-        if again:  # The old were not simulated in this round.
-            fitness = jnp.where(fresh | stay | ~now, fitness, -jnp.inf)
-        lives = distinct & (fresh | stay | chosen(self.config.survival, "best"))
-        tier = jnp.where(state.forced & young, jnp.where(taken_in, 2, 0), jnp.where(lives, 1, 0))
-        if not self.config.elites:  # the best always survives, whatever its tier
-            best = jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)
-            tier = jnp.where(best & distinct, 3, tier)
-        family = families(state, proposal.mothers)
-        if family is not None:
-            most = max(round(self.config.family * count), 1)
-            fit = distinct & (taken_in | ~(state.forced & fresh))
-            tier = with_share(family, most, tier, fitness, fit)
-        kept = jnp.lexsort((-fitness, -tier))[:count]
-        kept = kept[jnp.argsort(-fitness[kept], stable=True)]
-        genomes, terms, outcome, born, origin, rounds = jax.tree.map(lambda leaf: leaf[kept], pool)
-        refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(taken_in[kept]), 0)
-        mothers = proposal.mothers
-        if mothers is not None:
-            mothers = jnp.append(_own(state), mothers)[kept]
-        survivors = dataclasses.replace(
-            state,
-            genomes=genomes,
-            terms=terms,
-            outcome=outcome,
-            born=born,
-            origin=origin,
-            fitness=fitness[kept],
-            rounds=rounds,
-            family=None if family is None else family[kept],
-            refreshed=refreshed.astype(jnp.int32),
-        )
-        return survivors, mothers
 
 
 def _own(state: EvolutionState) -> jax.Array:

@@ -15,13 +15,7 @@ from mjxgait.config.schema import Config
 from mjxgait.config.traced import traced
 from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.controllers.key_poses.operators import pose_variation
-from mjxgait.evolution.breeding import (
-    families,
-    first_of_kind,
-    parents,
-    place_in_family,
-    proportional_parents,
-)
+from mjxgait.evolution.breeding import parents, proportional_parents
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.evolution import Evolution
 from mjxgait.evolution.state import (
@@ -32,6 +26,7 @@ from mjxgait.evolution.state import (
     Proposal,
     stop_reason,
 )
+from mjxgait.evolution.survival import families, first_of_kind, place_in_family
 from mjxgait.evolution.variation import Box, Variation, first_occurrence
 from mjxgait.types import Evaluation, pytree
 
