@@ -26,7 +26,7 @@ Evolve a stable walk for any creature.
 
 {commands}
 
-`mjxgait SUBCOMMAND --help` lists the options of each; `mjxgait --version` says which this is."""
+`mjxgait SUBCOMMAND --help` lists the options of each; `mjxgait --version` prints the version."""
 
 
 def _usage() -> str:

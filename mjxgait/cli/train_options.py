@@ -23,8 +23,8 @@ class TrainOptions(Verbosity):
     or FILE.py:CLASS of your own (docs/guide/your-own-task.md).
 
     Attributes:
-      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF, URDF) or
-        robot:NAME to import on the fly.
+      env: Name of a shipped creature, path of a creature folder, robot:NAME, or a model file to import
+        (MJCF, URDF, xacro, BVH or GLB).
       config: TOML file with settings, or the name of a shipped config such as wilson.
       scale: Size factors of parts, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
         (docs/reference/creature-folder.md). Lengths, masses and inertias follow, gains do not.
@@ -41,7 +41,7 @@ class TrainOptions(Verbosity):
         a run may differ: --generations, --evolution.target, --examination.
       generation: With --resume: the checkpoint to continue from, instead of the latest.
       population: Individuals of a generation; short for --evolution.population.
-      generations: Most generations of the run; short for --evolution.generations.
+      generations: Maximum number of generations; short for --evolution.generations.
       search: ga, the genetic algorithm, or es, an evolution strategy; short for --evolution.search
         (docs/reference/algorithm.md).
       evolve_body: Short for --evolution.body: 1.25 lets the parts below the trunk become up to a
@@ -49,8 +49,8 @@ class TrainOptions(Verbosity):
       speed: Target speed: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
         This and --gait, --turn, --steer and --style are for walking (docs/guide/gaits.md).
       gait: On four feet walk, amble, trot, pace, canter, bound, gallop or hop; on six walk, tripod
-        or wave; on eight alternating; on two walk, waddle or hop; natural is an animal's at this
-        speed, auto whatever evolves. By default that of [usual] in creature.toml, or else auto.
+        or wave; on eight alternating; on two walk, waddle or hop; natural: the gait of an
+        animal at this speed; auto: any gait. By default that of [usual] in creature.toml, or else auto.
       turn: Turn rate while walking, degrees per second to the left.
       steer: Largest commanded turn rate that the walk must follow, degrees per second to either
         side.
@@ -105,7 +105,7 @@ COMMON = (
 """Options that `--help` shows, besides `--seed`; `--help-all` shows all."""
 SHORT = f"""Evolve a walk for a creature.
 
-The first word may be the creature. The run folder gets the champion, its certificate and its plots.
+You may name the creature first: `mjxgait train crab`. The run folder gets the champion, its certificate and its plots.
 `mjxgait train {HELP_ALL}` lists further options and every key of the config; --controller and --task
 select another controller and task (docs/guide/your-own-task.md).
 """

@@ -181,7 +181,7 @@ class UseConfig:
       controller: what moves the creature: poses, program (docs/reference/expressions.md), network
         (docs/reference/network.md), brain (docs/reference/modular-bodies.md), or FILE.py:CLASS of
         your own (docs/guide/your-own-task.md).
-      task: what the creature is to do: walk, hop, limbo, travel; swim, walk, jump, follow and
+      task: what the creature is to do: walk, turn, hop, limbo, travel; swim, walk, jump, follow and
         follow-on-land of bodies that grow (docs/reference/modular-bodies.md); or FILE.py:CLASS of
         your own.
     """

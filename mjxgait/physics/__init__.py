@@ -17,7 +17,7 @@ from mjxgait.types import ModelPlant
 
 Parameters = TypeVar("Parameters")
 
-SLOWER = "15 to 30"
+SLOWER = "16 to 32"
 """Factor by which plain MJX is slower per creature-step (docs/research/performance.md)."""
 
 

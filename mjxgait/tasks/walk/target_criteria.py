@@ -156,9 +156,9 @@ def in_the_way(criteria: Sequence[Criterion]) -> str | None:
         return None
     first, nearest = missed[0], min(bounds, key=lambda m: m.margin)
     return (
-        f"{first.name}: {first.value:.3g}, where {first.threshold:g} may be. In the way stands "
-        f"{nearest.name}: {nearest.value:.3g} where {nearest.sense} {nearest.threshold:.3g} is "
-        "asked."
+        f"{first.name}: {first.value:.3g}; the limit is {first.threshold:g}. The tightest other "
+        f"measure is {nearest.name}: {nearest.value:.3g}; its limit is {nearest.sense} "
+        f"{nearest.threshold:.3g}."
     )
 
 
