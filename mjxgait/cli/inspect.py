@@ -74,25 +74,13 @@ def inspect_command(arguments: Sequence[str]) -> int:
         found = _verified(options)
         tell(found, _print_verified)
         return 0 if found["equal"] else 1
+    _check_paths(options)
     if options.diff:
-        if (
-            options.path is not None
-            or options.generation is not None
-            or options.individual is not None
-        ):
-            raise UserError(
-                "--diff takes two runs or checkpoints (such as RUN/checkpoints/5) and nothing else "
-                "but --json"
-            )
         return tell(
             inspect.differences(*map(inspect.read_snapshot, options.diff)),
             inspect.print_differences,
         )
-    if options.path is None:
-        raise UserError(
-            "name a run folder, a checkpoint, or a folder full of runs: mjxgait inspect "
-            "runs/tall_quadruped-seed0"
-        )
+    assert options.path is not None
     if runs := inspect.runs_in(options.path):
         return tell(inspect.list_runs(runs), inspect.print_runs)
     if begun := inspect.just_begun(options.path):
@@ -103,6 +91,21 @@ def inspect_command(arguments: Sequence[str]) -> int:
             inspect.individual_facts(snapshot, options.individual), inspect.print_individual
         )
     return tell(inspect.facts(snapshot), partial(inspect.print_facts, few=not options.all))
+
+
+def _check_paths(options: InspectOptions) -> None:
+    """Refuse `--diff` beside anything else, and no path without it."""
+    others = options.path, options.generation, options.individual
+    if options.diff and any(other is not None for other in others):
+        raise UserError(
+            "--diff takes two runs or checkpoints (such as RUN/checkpoints/5) and nothing else "
+            "but --json"
+        )
+    if not options.diff and options.path is None:
+        raise UserError(
+            "name a run folder, a checkpoint, or a folder full of runs: mjxgait inspect "
+            "runs/tall_quadruped-seed0"
+        )
 
 
 def _verified(options: InspectOptions) -> Verified:

@@ -14,8 +14,18 @@ def check_fit(creature: Creature, config: Config) -> None:
     Raises:
       UserError: gives the reason and a remedy.
     """
-    controller, task, name = config.use.controller, config.use.task, creature.name
-    grows, kind = controller_kind(controller).grows, known_task(task)
+    _check_options(creature, config)
+    if config.use.controller == "program":
+        check_programs(creature, config)
+    if creature.settings.creature.grows:
+        _check_growing(creature, config)
+    else:
+        _check_given(creature, config)
+
+
+def _check_options(creature: Creature, config: Config) -> None:
+    """Refuse settings that contradict each other, whatever the body."""
+    name, task = creature.name, config.use.task
     if config.examination.level != "walks" and task != "walk":
         raise UserError(
             f"examination.level = {config.examination.level}: it is for walks, and this task is "
@@ -33,24 +43,29 @@ def check_fit(creature: Creature, config: Config) -> None:
                 f"controller.around has {len(around)} angles; {config.controller.key_poses} key poses "
                 f"of {name} have {wanted}; --gait auto begins with no poses that were drawn"
             )
-    if controller == "program":
-        check_programs(creature, config)
-    if not creature.settings.creature.grows:
-        if config.rollout.step:
-            raise UserError(
-                f"{name}: rollout.step is for bodies that grow; creature.xml has this one's step"
-            )
-        if grows:
-            raise UserError(
-                f"{name}: its body is there already, and a {controller} grows with its own; take "
-                "--env blocks, or another controller"
-            )
-        if kind and kind.modular:
-            raise UserError(
-                f"{name}: only bodies that grow {task}; take --env blocks, or another task"
-            )
-        return
-    if not grows:
+
+
+def _check_given(creature: Creature, config: Config) -> None:
+    """Refuse settings of bodies that grow, for a body that a file gives."""
+    controller, task, name = config.use.controller, config.use.task, creature.name
+    if config.rollout.step:
+        raise UserError(
+            f"{name}: rollout.step is for bodies that grow; creature.xml has this one's step"
+        )
+    if controller_kind(controller).grows:
+        raise UserError(
+            f"{name}: its body is there already, and a {controller} grows with its own; take "
+            "--env blocks, or another controller"
+        )
+    kind = known_task(task)
+    if kind and kind.modular:
+        raise UserError(f"{name}: only bodies that grow {task}; take --env blocks, or another task")
+
+
+def _check_growing(creature: Creature, config: Config) -> None:
+    """Refuse settings of bodies that a file gives, for a body that grows."""
+    controller, task, name = config.use.controller, config.use.task, creature.name
+    if not controller_kind(controller).grows:
         raise UserError(
             f"{name}: its body grows with its brain, so {controller} has nothing to move; leave "
             "--controller out"

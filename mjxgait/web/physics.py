@@ -60,6 +60,17 @@ def write_physics_page(run: Path, out: Path, wasm: Path | None = None) -> str:
     return said
 
 
+LEAD = (
+    "This is physics, not animation: MuJoCo runs in this page, and the evolved controller moves the "
+    "joints."
+)
+CONTENTS = (
+    f"MuJoCo {VERSION} (npm package {PACKAGE}, Google DeepMind) and model-viewer (Google), both "
+    "under the Apache License 2.0; the creature and its controller, by mjxgait. The page asks for no "
+    "other file and no network."
+)
+
+
 def build_physics_page(
     creature: Creature,
     facts: Facts,
@@ -87,21 +98,13 @@ def build_physics_page(
         "water": afloat,
         "push": speed * (creature.gravity * creature.frame.hip_height) ** 0.5,
     }
-    lead = (
-        "This is physics, not animation: MuJoCo runs in this page, and the evolved controller moves "
-        f"the joints. {said or 'Undisturbed, it is certified'}."
-    )
-    contents = (
-        f"MuJoCo {VERSION} (npm package {PACKAGE}, Google DeepMind) and model-viewer (Google), both "
-        "under the Apache License 2.0; the creature and its controller, by mjxgait. The page asks "
-        "for no other file and no network."
-    )
+    lead = f"{LEAD} {said or 'Undisturbed, it is certified'}."
     script = engine.script.replace(EXPORT, "globalThis.loadMujoco = loadMujoco;")
     return string.Template((web / "physics.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(creature.name.replace("_", " ")),
         style=style(),
         lead=html.escape(lead),
-        contents=html.escape(contents),
+        contents=html.escape(CONTENTS),
         licence=html.escape((web / "model-viewer.LICENSE").read_text(encoding="utf-8")),
         glb=base64.b64encode(glb).decode("ascii"),
         target=f"0m {height:.3f}m 0m",
