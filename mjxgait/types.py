@@ -39,8 +39,8 @@ class BodyState:
     warmstart: [nv] previous acceleration, where the contact solver starts.
     constraint_force: [nv] N, N·m; generalised force of the previous contact solve.
     friction: [] factor on the floor's sliding friction.
-    parameters: this lane's own body parameters, as from `Plant.parameters_of`; None where the
-    plant's apply.
+    parameters: this lane's own body parameters, as from `ModelPlant.parameters_of`; None where
+    the plant's apply.
     ground: a `Ground` under this lane's creature; None for the plane z = 0, which costs nothing.
     """
 

@@ -146,7 +146,7 @@ class Champion:
 def split_genome(genome: Genome) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
     """Return the controller's arrays by name, and the logarithms of the sizes [..., Z] or None.
 
-    Only genomes of `controllers.sized_body.Bodied` have sizes.
+    Only genomes of `controllers.base.Bodied` have sizes.
     """
     own = {n.removeprefix("plan."): a for n, a in genome.items() if n.startswith("plan.")}
     return (own, genome["sizes"]) if own else (dict(genome), None)

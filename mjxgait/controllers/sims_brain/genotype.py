@@ -74,8 +74,8 @@ class Graph:
     """Genotype of a body. Growth begins at node 0.
 
     Nodes: half [N, 3] m, half sizes of a block; joint [N], to the parent, an index into
-    `reference_body.material.JOINTS`; swing [N, 3] rad, range of each hinge to either side;
-    recursion [N], how often a node may recur on one branch.
+    `reference_body.JOINTS`; swing [N, 3] rad, range of each hinge to either side; recursion [N],
+    how often a node may recur on one branch.
     Connections, [N, C]: target, a node; used; place [N, C, 3], a direction from the parent block's
     middle, in its half sizes, that leaves the block at the child's joint; turn [N, C, 3] rad about
     the joint's outward axis and the two others; scale; mirror, 0 unchanged, 1 mirrored, 2 both;

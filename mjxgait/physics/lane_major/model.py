@@ -204,7 +204,7 @@ def softened(
 ) -> Softened:
     """Convert the parameters as MuJoCo's engine does.
 
-    Computation docs, "Parameters"; MJX `constraint._kbi`.
+    Computation docs, "Parameters"; `mujoco.mjx._src.constraint._kbi`.
     """
     time, ratio = (float(x) for x in solref)
     low, high, width, mid, power = (float(x) for x in solimp)
