@@ -9,6 +9,7 @@ import dataclasses
 from typing import Any, Protocol, Self, TypeVar, dataclass_transform
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 T = TypeVar("T")
@@ -28,6 +29,21 @@ def by_name(tree: object) -> dict[str, Any]:
     """Return the leaves of a pytree by dotted name, as in checkpoints."""
     leaves = jax.tree_util.tree_leaves_with_path(tree)
     return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
+
+
+def choose(condition: Number | bool, yes: Tree, no: Tree) -> Tree:
+    """Return `yes` where the condition [...] holds, else `no`; both with leaves [..., *].
+
+    A condition [] chooses whole pytrees, one [M] chooses row by row.
+    """
+    shape = jnp.shape(condition)
+
+    def pick(one: jax.Array, other: jax.Array) -> jax.Array:
+        more = one.ndim - len(shape)
+        where = jnp.reshape(condition, (*shape, *[1] * more)) if shape and more else condition
+        return jnp.where(where, one, other)
+
+    return jax.tree.map(pick, yes, no)
 
 
 @pytree

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.evolution.offspring import children, forced, pick_rows
+from mjxgait.evolution.offspring import children, forced
 from mjxgait.evolution.state import (
     NOBODY,
     EvolutionState,
@@ -26,7 +26,7 @@ from mjxgait.evolution.state import (
 from mjxgait.evolution.strategy import Normal, SeparableCma
 from mjxgait.evolution.survival import Survival, pooled, together
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Evaluation
+from mjxgait.types import Evaluation, choose
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -228,7 +228,7 @@ class Evolution:
         keys_forced = jax.random.split(key_forced, 2 + self.config.forced.mutations)
         created = self.variation.create(keys_forced[0], self.config.offspring)
         known = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
-        initial = pick_rows(places < self.config.population, known, created)
+        initial = choose(places < self.config.population, known, created)
         bred, child_origin, of_child = self._children(key_children, state)
         mutants, forced_origin, of_mutant = forced(
             keys_forced[1:], self.config, self.variation, state, created

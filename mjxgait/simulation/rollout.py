@@ -23,13 +23,7 @@ from mjxgait.controllers.spd import Drive, Function, Rules, per_lane
 from mjxgait.creature.body import Body
 from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, Task
 from mjxgait.tasks.starts import Starts
-from mjxgait.types import (
-    BodyState,
-    Plant,
-    Sensed,
-    Tree,
-    pytree,
-)
+from mjxgait.types import BodyState, Plant, Sensed, choose, pytree
 
 CHECK_EVERY = 16
 """Steps between checks for free lanes, which cost about a step each, and for overlap of parts."""
@@ -352,11 +346,6 @@ def deepened(stats: EpisodeStats, depth: jax.Array, steps: int) -> EpisodeStats:
     """
     deeper = is_going(stats, steps) & (depth > stats.overlap)
     return dataclasses.replace(stats, overlap=jnp.where(deeper, depth, stats.overlap))
-
-
-def choose(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
-    """Return one of two pytrees by a condition []."""
-    return jax.tree.map(partial(jnp.where, condition), yes, no)
 
 
 def _push(lane: Lane) -> BodyState:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
 from mjxgait.controllers.sims_brain.reference_body import AXES, LARGEST, ROOM, SMALLEST
-from mjxgait.types import pytree
+from mjxgait.types import choose, pytree
 
 
 @pytree
@@ -97,7 +97,7 @@ def grown(graph: Graph, capacity: Capacity) -> Parts:
             wanted = grows & ((mirror == image) | (mirror == 2))
             growing, fits = _with_part(graph, growing, part, place, image, wanted)
             room = room & fits
-        return jax.tree.map(lambda a, b: jnp.where(room, a, b), growing, before)
+        return choose(room, growing, before)
 
     growing = jax.lax.fori_loop(0, capacity.parts * connections, step, _seed(graph, capacity))
     return growing.parts

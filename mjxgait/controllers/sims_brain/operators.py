@@ -25,7 +25,7 @@ from mjxgait.controllers.sims_brain.genotype import (
     random_graph,
     random_nerves,
 )
-from mjxgait.types import pytree
+from mjxgait.types import choose, pytree
 
 
 @pytree
@@ -115,7 +115,7 @@ class Kin:
             used=graph.used.at[at].set(True),
         )
         grafted = dataclasses.replace(hung, graph=joined)
-        return jax.tree.map(lambda a, b: jnp.where(free.any(), a, b), grafted, mother)
+        return choose(free.any(), grafted, mother)
 
     def _strength(self, key: jax.Array) -> jax.Array:
         """Draw the factor [] of one mutation."""
@@ -203,7 +203,7 @@ def _with_new_node(
     )
     new = dataclasses.replace(new, graph=graph)
     ok = (drawn["happens"] < chance) & ~alive.all() & spare.any()
-    return jax.tree.map(lambda a, b: jnp.where(ok, a, b), new, genotype)
+    return choose(ok, new, genotype)
 
 
 def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: jax.Array) -> Graph:
@@ -218,20 +218,15 @@ def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: jax.Array) 
     here = jnp.zeros((nodes, connections), bool).at[chosen].set(drawn["happens"] < chance)
     here = here & open_slots
     node = jnp.argmax(jnp.where(alive, drawn["target"], -1.0))
-    names = ("place", "turn", "scale", "mirror", "terminal")
-    fresh = {
-        name: jnp.where(
-            here.reshape(*here.shape, *[1] * (getattr(graph, name).ndim - 2)) & adds,
-            getattr(other, name),
-            getattr(graph, name),
-        )
-        for name in names
-    }
+    fresh, known = (
+        {name: getattr(one, name) for name in ("place", "turn", "scale", "mirror", "terminal")}
+        for one in (other, graph)
+    )
     return dataclasses.replace(
         graph,
         used=jnp.where(here, adds, graph.used),
         target=jnp.where(here & adds, node, graph.target),
-        **fresh,
+        **choose(here & adds, fresh, known),
     )
 
 
@@ -253,9 +248,5 @@ def _without_used(genotype: Genotype) -> Genotype:
 
 def _chosen(first: jax.Array, one: Genotype, other: Genotype) -> Genotype:
     """Take nodes [N] from `one` where `first`, else from `other`; central neurons from `one`."""
-
-    def pick(a: jax.Array, b: jax.Array) -> jax.Array:
-        return jnp.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b)
-
-    graph, nerves = jax.tree.map(pick, (one.graph, one.nerves), (other.graph, other.nerves))
+    graph, nerves = choose(first, (one.graph, one.nerves), (other.graph, other.nerves))
     return Genotype(graph, nerves, one.centre)
