@@ -26,7 +26,7 @@ from mjxgait.evolution.state import (
 from mjxgait.evolution.strategy import Normal, SeparableCma
 from mjxgait.evolution.survival import Survival, pooled, together
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Evaluation, choose
+from mjxgait.types import Evaluation, Tree, choose
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -139,9 +139,7 @@ class Evolution:
         survival = Survival(self.config, self.variation, now if again else None, self._stay(state))
         grown, mothers = survival.survivors(state, proposal, pool, fitness, evaluation.terms)
         planted = self._plant(state, proposal, evaluation, generation)
-        state = jax.tree.map(
-            lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
-        )
+        state = choose(seeding, _without_key(planted), _without_key(grown))
         was_forced = state.forced
         state = dataclasses.replace(state, key=proposal.key, generation=generation)
         normal = self._learnt(state, proposal, evaluation, seeding)
@@ -234,10 +232,10 @@ class Evolution:
             keys_forced[1:], self.config, self.variation, state, created
         )
 
-        def pick(first: jax.Array, second: jax.Array, third: jax.Array) -> jax.Array:
-            return jnp.where(seeding, first, jnp.where(state.forced, second, third))
+        def pick(first: Tree, second: Tree, third: Tree) -> Tree:
+            return choose(seeding, first, choose(state.forced, second, third))
 
-        genomes = jax.tree.map(pick, initial, mutants, bred)
+        genomes = pick(initial, mutants, bred)
         origin = pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
         if not self.config.follows or of_child is None:
             return genomes, origin, None

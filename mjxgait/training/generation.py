@@ -26,7 +26,7 @@ from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.base import Task, in_order, score
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.spec import BodyParams, SimulatorSpec
-from mjxgait.types import Evaluation, RequestedTrials, pytree
+from mjxgait.types import Evaluation, RequestedTrials, choose, pytree
 
 LEADERS = 16
 """Number of a row's best individuals that decide on the next curriculum level."""
@@ -99,8 +99,7 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
 
     def seated(children: jax.Array, best: jax.Array) -> jax.Array:
         guests, last = best[sources, rank % best.shape[1]], children[:, -count:]
-        who = comes.reshape(*comes.shape, *[1] * (guests.ndim - 2))
-        return children.at[:, -count:].set(jnp.where(who, guests, last))
+        return children.at[:, -count:].set(choose(comes, guests, last))
 
     mothers = proposals.mothers
     if mothers is not None:
