@@ -126,10 +126,10 @@ def in_words(report: Mapping[str, Any]) -> str | None:
     stride, duty = found.get("stride"), found.get("duty_factor")
     if stride is None or duty is None or not np.isfinite([stride, duty]).all():
         return None
-    told = f"Strides are {stride:.2f} and duty factors {duty:.2f} of an animal's at this speed"
+    sentence = f"Strides are {stride:.2f} and duty factors {duty:.2f} of an animal's at this speed"
     if (often := found.get("patter") or 0.0) < 0.5:
-        return f"{told}."
-    return f"{told}; in each of them a foot loses the floor for a moment {often:.1f} times."
+        return f"{sentence}."
+    return f"{sentence}; in each of them a foot loses the floor for a moment {often:.1f} times."
 
 
 def patter(window: Recording) -> float:

@@ -256,14 +256,14 @@ def read_champion(path: Path, creature: Creature) -> Champion:
         champion = _champion(document, creature, path)
         champion.check_finite(creature)
     except DamagedFile as error:
-        told = str(error).removeprefix(f"{path}: ")
-        raise DamagedChampion(f"{path}: damaged, or not a champion file ({told})") from None
+        message = str(error).removeprefix(f"{path}: ")
+        raise DamagedChampion(f"{path}: damaged, or not a champion file ({message})") from None
     except UserError as error:
-        told = str(error)
-        raise UserError(told if str(path) in told else f"{path}: {told}") from None
+        message = str(error)
+        raise UserError(message if str(path) in message else f"{path}: {message}") from None
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
-        told = reprlib.repr(str(error))
-        raise DamagedChampion(f"{path}: damaged, or not a champion file ({told})") from None
+        message = reprlib.repr(str(error))
+        raise DamagedChampion(f"{path}: damaged, or not a champion file ({message})") from None
     return champion
 
 

@@ -127,12 +127,12 @@ class RolloutConfig:
 
     @property
     def promotes(self) -> bool:
-        """Tell whether only a share of the individuals runs all starts."""
+        """Return whether only a share of the individuals runs all starts."""
         return self.promote < 1 and self.starts > 1
 
     @property
     def uneven(self) -> bool:
-        """Tell whether perturbed starts have uneven ground of their own."""
+        """Return whether perturbed starts have uneven ground of their own."""
         return bool(self.slope or self.rough)
 
 

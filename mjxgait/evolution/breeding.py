@@ -130,7 +130,7 @@ def _with_room(leaf: jax.Array, count: int) -> jax.Array:
 
 
 def _holds(pool: object, size: jax.Array, genome: object) -> jax.Array:
-    """Tell whether [] one of the first `size` of a pool equals a genome."""
+    """Return whether [] one of the first `size` of a pool equals a genome."""
     same = [
         jnp.all(leaf == one, axis=tuple(range(1, leaf.ndim)))
         for leaf, one in zip(jax.tree.leaves(pool), jax.tree.leaves(genome), strict=True)

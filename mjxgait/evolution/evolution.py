@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.evolution.offspring import children, forced
 from mjxgait.evolution.state import (
-    NOBODY,
+    NO_MOTHER,
     EvolutionState,
     GenerationMetrics,
     Origin,
@@ -103,7 +103,7 @@ class Evolution:
         return min(self.config.population, self.config.offspring), state.stale
 
     def _stay(self, state: EvolutionState) -> jax.Array:
-        """Tell whether [] parents survive although otherwise only children do.
+        """Return whether [] parents survive although otherwise only children do.
 
         A forced generation replaces only the worst of the population. Its parents keep the fitness
         of the generation before.
@@ -145,10 +145,10 @@ class Evolution:
         normal = self._learnt(state, proposal, evaluation, seeding)
         state = dataclasses.replace(state, normal=normal)
         state = decided(self.config, state)
-        told = None
+        logged = None
         if self.config.lineage and mothers is not None:
-            told = jnp.where(seeding, NOBODY, mothers)
-        return state, metrics(self.config, state, evaluation, was_forced, told)
+            logged = jnp.where(seeding, NO_MOTHER, mothers)
+        return state, metrics(self.config, state, evaluation, was_forced, logged)
 
     @property
     def _strategy(self) -> SeparableCma:
@@ -239,8 +239,8 @@ class Evolution:
         origin = pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
         if not self.config.follows or of_child is None:
             return genomes, origin, None
-        of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NOBODY, of_mutant)
-        return genomes, origin, pick(jnp.full_like(origin, NOBODY), of_mutant, of_child)
+        of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NO_MOTHER, of_mutant)
+        return genomes, origin, pick(jnp.full_like(origin, NO_MOTHER), of_mutant, of_child)
 
     def _children(
         self, key: jax.Array, state: EvolutionState

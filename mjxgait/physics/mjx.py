@@ -58,10 +58,10 @@ class MjxPlant:
     ) -> ModelNumbers:
         """See `ModelPlant.parameters_of`."""
         device_model = mjx.put_model(model, impl="jax")
-        told = model_difference(self.model, device_model)
-        told = told or _sense_difference(self.layout, layout, self.crossings, crossings)
-        if told:
-            raise OtherTopology(told)
+        reason = model_difference(self.model, device_model)
+        reason = reason or _sense_difference(self.layout, layout, self.crossings, crossings)
+        if reason:
+            raise OtherTopology(reason)
         # In NumPy, because an array of MJX belongs to one device.
         return jax.device_get(read_numbers(model, device_model, layout, crossings))
 

@@ -112,8 +112,8 @@ class Simulator:
         )
         plans = jax.vmap(jax.vmap(self.controller.prepare, (0, None)))(genomes, settings.controller)
         turns = self._turns(plans, shape, wanted)
-        nobody = jnp.arange(total, len(dealt), dtype=jnp.int32)
-        jobs = dealt if turns is None else jnp.concatenate([turns, nobody])[dealt]
+        padding = jnp.arange(total, len(dealt), dtype=jnp.int32)
+        jobs = dealt if turns is None else jnp.concatenate([turns, padding])[dealt]
         if wanted is not None:
             jobs = jnp.where(dealt < jnp.sum(wanted), jobs, total)
         stats, computed = run(jobs, plans, starts, settings, self._own_starts(genomes, starts))
@@ -250,7 +250,7 @@ class Simulator:
 
     @property
     def _holds(self) -> bool:
-        """Tell whether a command is held for several steps."""
+        """Return whether a command is held for several steps."""
         return self.controller.every > 1
 
     def _step(self, k: jax.Array, lane: Lane) -> Lane:
@@ -335,7 +335,7 @@ def reason_of(task: Task, sensed: Sensed, goal: object) -> jax.Array:
 
 
 def is_going(stats: EpisodeStats, steps: int) -> jax.Array:
-    """Tell whether [] an episode of so many steps has not ended."""
+    """Return whether [] an episode of so many steps has not ended."""
     return (stats.reason == FINISHED) & (stats.steps < steps)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from mjxgait.config.schema import Config
 from mjxgait.evolution.evolution import Evolution
 from mjxgait.evolution.state import (
-    NOBODY,
+    NO_MOTHER,
     EvolutionState,
     GenerationMetrics,
     Proposal,
@@ -103,7 +103,7 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
 
     mothers = proposals.mothers
     if mothers is not None:
-        mothers = seated(mothers, jnp.full_like(states.origin, NOBODY))
+        mothers = seated(mothers, jnp.full_like(states.origin, NO_MOTHER))
     return dataclasses.replace(
         proposals,
         offspring=jax.tree.map(seated, proposals.offspring, states.genomes),
@@ -173,9 +173,9 @@ def absorb(
         given: tuple[RunParams, EvolutionState, Proposal, Evaluation],
     ) -> tuple[EvolutionState, GenerationMetrics]:
         row, state, proposal, evaluation = given
-        after, told = evolution_of(simulator, row.settings).absorb(state, proposal, evaluation)
+        after, logged = evolution_of(simulator, row.settings).absorb(state, proposal, evaluation)
         after = climbed(simulator.task, row.settings.fitness, after)
-        return after, dataclasses.replace(told, level=after.level)
+        return after, dataclasses.replace(logged, level=after.level)
 
     return jax.lax.map(of_row, (rows, states, proposals, evaluation))
 

@@ -45,9 +45,9 @@ def check_supported(model: mujoco.MjModel) -> list[tuple[int, int]]:
 def _refuse(when: ArrayLike, reason: str, names: Sequence[str] = ()) -> None:
     """Raise if `when` [n] holds anywhere, and list the names of the elements for which it holds."""
     if np.any(when):
-        told = [name for name, guilty in zip(names, np.ravel(when), strict=False) if guilty]
-        some = ", ".join(told[:3]) + (f" and {len(told) - 3} more" if len(told) > 3 else "")
-        raise UnsupportedModel(f"{reason}: {some}" if told else reason)
+        found = [name for name, guilty in zip(names, np.ravel(when), strict=False) if guilty]
+        some = ", ".join(found[:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
+        raise UnsupportedModel(f"{reason}: {some}" if found else reason)
 
 
 def _check_options(model: mujoco.MjModel) -> None:

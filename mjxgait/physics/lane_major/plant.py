@@ -100,11 +100,11 @@ class FastPlant:
         """See `ModelPlant.parameters_of`."""
         try:
             other = fast_plant(model, layout, crossings, padded=self.topology.open_pairs)
-            told = difference(self.topology, other.topology)
-        except UnsupportedModel as reason:
-            told = f"the fast physics does not know this: {reason}"
-        if told:
-            raise OtherTopology(told)
+            reason = difference(self.topology, other.topology)
+        except UnsupportedModel as error:
+            reason = f"the fast physics does not know this: {error}"
+        if reason:
+            raise OtherTopology(reason)
         return other.parameters
 
     def with_parameters(self, parameters: Parameters) -> Self:
