@@ -37,7 +37,6 @@ class Brains:
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
-    grows: ClassVar[bool] = True
 
     @classmethod
     def with_settings(
