@@ -14,8 +14,9 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.clips.clip import NOTE
+from mjxgait.animation.export.floor import add_tiles
 from mjxgait.animation.export.footfalls import contacts
-from mjxgait.animation.export.gltf import Buffer, add_channel, add_tiles, facts_of
+from mjxgait.animation.export.gltf import Buffer, add_channel, facts_of
 from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.scenery import add_scenery
 from mjxgait.animation.export.shaped import material_of, shaped
