@@ -21,7 +21,7 @@ from mjxgait.config.tables import (
     build,
     check,
 )
-from mjxgait.controllers.key_poses.config import DriveConfig
+from mjxgait.controllers.config import DriveConfig
 from mjxgait.creature import Creature
 from mjxgait.creature.proportions import grown, proportions
 from mjxgait.errors import UserError

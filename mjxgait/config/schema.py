@@ -20,7 +20,8 @@ from mjxgait.config.tables import (
     Share,
     Whole,
 )
-from mjxgait.controllers.key_poses.config import DriveConfig, PoseConfig
+from mjxgait.controllers.config import DriveConfig
+from mjxgait.controllers.key_poses.config import PoseConfig
 from mjxgait.creature.ground.spec import FLAT, check_ground
 from mjxgait.tasks.walk.config import WalkConfig
 
