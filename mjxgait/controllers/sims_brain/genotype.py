@@ -23,7 +23,7 @@ LEAST = 2.0**-24
 """Half of the smallest positive number that is drawn."""
 
 
-def numbers(key: jax.Array, shapes: Mapping[Name, tuple[int, ...]]) -> dict[Name, jax.Array]:
+def uniforms(key: jax.Array, shapes: Mapping[Name, tuple[int, ...]]) -> dict[Name, jax.Array]:
     """Draw uniform numbers in [0, 1), by name, in these shapes."""
     ends = np.cumsum([math.prod(shape) for shape in shapes.values()])
     parts = jnp.split(jax.random.uniform(key, (int(ends[-1]),)), ends[:-1])
@@ -103,7 +103,7 @@ def random_graph(key: jax.Array, capacity: Capacity, ranges: Ranges) -> Graph:
     """
     nodes, connections = capacity.nodes, capacity.connections
     each = (nodes, connections)
-    drawn = numbers(
+    drawn = uniforms(
         key,
         {
             "half": (nodes, 3),
@@ -195,7 +195,7 @@ def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
     """Draw random neurons: any function, any source; weights are normal."""
     effects = {"effect_source": (nodes, 3), "effect_weight": (nodes, 3)}
     steer = {"steer": (nodes, 3, 2, 3)} if room.steer else {}
-    drawn = numbers(key, _shapes((nodes, room.local)) | effects | steer)
+    drawn = uniforms(key, _shapes((nodes, room.local)) | effects | steer)
     source = numbered(drawn["effect_source"], room.codes)
     return Nerves(
         **_neurons(drawn, room),
@@ -207,7 +207,7 @@ def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
 
 def random_centre(key: jax.Array, room: NerveRoom) -> Centre:
     """Draw random central neurons, as `random_nerves` does."""
-    return Centre(**_neurons(numbers(key, _shapes((room.central,))), room))
+    return Centre(**_neurons(uniforms(key, _shapes((room.central,))), room))
 
 
 def _favoured(uniform: jax.Array, share: float, one: int, count: int) -> jax.Array:

@@ -20,10 +20,10 @@ from mjxgait.controllers.sims_brain.genotype import (
     Ranges,
     normal,
     numbered,
-    numbers,
     random_centre,
     random_graph,
     random_nerves,
+    uniforms,
 )
 from mjxgait.types import choose, pytree
 
@@ -135,7 +135,7 @@ class Kin:
         size = jnp.sum(alive) * sum(leaf[0].size for leaf in of_nodes)
         chance = strength * self.rates.value / size
         places = range(len(leaves))
-        drawn = numbers(
+        drawn = uniforms(
             key, {(use, i): leaves[i].shape for i in places for use in ("which", "how")}
         )
         bounds = self._bounds(shape)
@@ -190,7 +190,7 @@ def _with_new_node(
     """Draw an unconnected node anew, and connect it."""
     alive = reachable(genotype.graph)
     nodes, connections = genotype.graph.target.shape
-    drawn = numbers(key, {"happens": (), "node": (nodes,), "slot": (nodes, connections)})
+    drawn = uniforms(key, {"happens": (), "node": (nodes,), "slot": (nodes, connections)})
     free = jnp.argmax(jnp.where(alive, -1.0, drawn["node"]))
     new = _chosen(jnp.arange(nodes) != free, genotype, other)
     # The new node has no connections of its own yet.
@@ -211,7 +211,7 @@ def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: jax.Array) 
     alive = reachable(graph)
     nodes, connections = graph.target.shape
     shapes = {"happens": (), "adds": (), "slot": (nodes, connections), "target": (nodes,)}
-    drawn = numbers(key, shapes)
+    drawn = uniforms(key, shapes)
     adds = drawn["adds"] < 0.5
     open_slots = alive[:, None] & jnp.where(adds, ~graph.used, graph.used)
     chosen = _one_of(drawn["slot"], open_slots)
