@@ -23,6 +23,7 @@ on the plain floor, up to the fall if there is one. Columns:
 """
 
 import argparse
+import copy
 import dataclasses
 import json
 import sys
@@ -36,7 +37,7 @@ import numpy as np
 from mjxgait.certification import CertificateConfig, push_ladder
 from mjxgait.certification.certificate import half_point
 from mjxgait.certification.config import PushesConfig
-from mjxgait.certification.stress import slippery, sloping
+from mjxgait.certification.stress import slippery
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -164,6 +165,17 @@ def bumps(
         simulate(floor, champion, share, SECONDS, fall=Fall(touch=False))
         for floor, share in zip(floors, shares, strict=True)
     ]
+
+
+def sloping(creature: Creature, angle: float) -> Creature:
+    """Return the creature on ground that rises forward by `angle` rad; gravity is tilted instead."""
+    model = copy.copy(creature.model)
+    forward = (creature.frame.stand_rot @ creature.frame.forward) * [1.0, 1.0, 0.0]
+    forward /= np.linalg.norm(forward)
+    model.opt.gravity[:] = model.opt.gravity[2] * (
+        np.sin(angle) * forward + [0.0, 0.0, np.cos(angle)]
+    )
+    return dataclasses.replace(creature, model=model)
 
 
 def slopes(creature: Creature, champion: Champion, starts: Starts, sign: int) -> dict[str, Any]:

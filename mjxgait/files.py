@@ -47,9 +47,9 @@ def read_bytes(path: Path, most: int = MOST_TEXT) -> bytes:
     except FileNotFoundError:
         raise UserError(f"{path}: no such file") from None
     except (OSError, ValueError) as error:
-        told = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
+        cause = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
         kind = DamagedFile if getattr(error, "errno", None) == errno.EISDIR else UserError
-        raise kind(f"{path}: cannot be read ({told})") from None
+        raise kind(f"{path}: cannot be read ({cause})") from None
     if len(data) > most:
         raise DamagedFile(f"{path}: larger than {most // 1_000_000} MB, so it is not read")
     return data

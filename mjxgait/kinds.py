@@ -136,7 +136,7 @@ def task_kind(name: str) -> TaskKind:
 
 
 def in_water(task: str) -> bool:
-    """Tell whether a task takes place in water."""
+    """Return whether a task takes place in water."""
     kind = known_task(task)
     return kind is not None and kind.water
 

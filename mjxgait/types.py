@@ -9,6 +9,7 @@ import dataclasses
 from typing import Any, Protocol, Self, TypeVar, dataclass_transform
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 T = TypeVar("T")
@@ -30,6 +31,21 @@ def by_name(tree: object) -> dict[str, Any]:
     return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
 
 
+def choose(condition: Number | bool, yes: Tree, no: Tree) -> Tree:
+    """Return `yes` where the condition [...] holds, else `no`; both with leaves [..., *].
+
+    A condition [] chooses whole pytrees, one [M] chooses row by row.
+    """
+    shape = jnp.shape(condition)
+
+    def pick(one: jax.Array, other: jax.Array) -> jax.Array:
+        more = one.ndim - len(shape)
+        where = jnp.reshape(condition, (*shape, *[1] * more)) if shape and more else condition
+        return jnp.where(where, one, other)
+
+    return jax.tree.map(pick, yes, no)
+
+
 @pytree
 class BodyState:
     """State that the physics carries from one step to the next.
@@ -39,8 +55,8 @@ class BodyState:
     warmstart: [nv] previous acceleration, where the contact solver starts.
     constraint_force: [nv] N, N·m; generalised force of the previous contact solve.
     friction: [] factor on the floor's sliding friction.
-    parameters: this lane's own body parameters, as from `Plant.parameters_of`; None where the
-    plant's apply.
+    parameters: this lane's own body parameters, as from `ModelPlant.parameters_of`; None where
+    the plant's apply.
     ground: a `Ground` under this lane's creature; None for the plane z = 0, which costs nothing.
     """
 

@@ -21,13 +21,8 @@ from mjxgait.champion import Champion
 from mjxgait.cli import main
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import build
-from mjxgait.controllers.key_poses.config import (
-    STEPPING,
-    TUNING,
-    DriveConfig,
-    PoseConfig,
-    gene_names,
-)
+from mjxgait.controllers.config import DriveConfig
+from mjxgait.controllers.key_poses.config import STEPPING, TUNING, PoseConfig, gene_names
 from mjxgait.creature import Creature
 from mjxgait.simulation.evaluator import completed
 from mjxgait.tasks.base import in_order

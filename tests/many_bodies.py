@@ -1,5 +1,6 @@
 """Bodies of one topology that differ in every number, and their simulation in C MuJoCo."""
 
+import copy
 import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -8,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mjxgait.physics.derived import ObservationLayout
 from mjxgait.types import BodyState, Plant
@@ -55,6 +57,18 @@ SLIM = {"xla_backend_optimization_level": 0}
 """Compilation takes most of the time here."""
 
 Everything = tuple[Any, jax.Array, BodyState]
+
+
+def heavier_model(model: mujoco.MjModel, factor: ArrayLike) -> mujoco.MjModel:
+    """Return a copy with masses and inertias times factor, [] or [nbody - 1].
+
+    MuJoCo recomputes what follows from them (`mj_setConst`).
+    """
+    heavy = copy.deepcopy(model)
+    heavy.body_mass[1:] *= factor
+    heavy.body_inertia[1:] = (heavy.body_inertia[1:].T * factor).T
+    mujoco.mj_setConst(heavy, mujoco.MjData(heavy))
+    return heavy
 
 
 def varied(xml: str, seed: int, most: float = 0.25) -> mujoco.MjModel:

@@ -46,7 +46,7 @@ FLOORS = (
     ),
     ("creature/body",),
     ("creature",),
-    ("config", "controllers/*/config", "tasks/*/*config", "tasks/walk/gaits"),
+    ("config", "controllers/config", "controllers/*/config", "tasks/*/*config", "tasks/walk/gaits"),
     ("creature/ground", "animation/clips"),
     ("types", "processes", "kinds"),
     ("cache",),

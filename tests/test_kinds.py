@@ -23,7 +23,6 @@ def test_a_controller_has_all_of_its_parts(kind):
     assert callable(kind.part("reference"))
     assert {"document", "genome"} <= set(dir(kind.part("serializer")()))
     assert {"facts", "show"} <= set(dir(kind.part("report")()))
-    assert getattr(kind.part("controller"), "grows", False) == kind.grows
 
 
 @pytest.mark.parametrize("kind", tasks().values(), ids=lambda kind: kind.name)

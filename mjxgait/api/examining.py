@@ -56,7 +56,7 @@ def examine(run: Run | Place, config: Place | None = None) -> Certificate:
 def verify(run: Run | Place) -> list[str]:
     """Return the differences between a second examination of a champion and its certificate.
 
-    One phrase each; empty if all measures are equal (`certification.verify.TOLERANCE`). The second
+    One phrase each; empty if all measures are equal (`validity.TOLERANCE`). The second
     examination uses the thresholds of the certificate. Writes nothing.
 
     Raises:

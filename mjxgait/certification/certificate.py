@@ -14,7 +14,7 @@ from mjxgait.certification.advice import FELL_AFTER, advised
 from mjxgait.certification.check_body import check_body
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
-from mjxgait.certification.trials import AIMS, simulate, told_to_turn
+from mjxgait.certification.trials import AIMS, simulate, steering_criteria
 from mjxgait.certification.verdict import Document, MeasureEntry, Verdict, verdict_of, verdict_on
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -186,7 +186,7 @@ def certify(
     plain, _, *pushed = (float(up.mean()) for up in np.split(outcome.stayed_up, ends))
     started = float(np.split(acceptance.succeeded(outcome, starts, config), ends)[1].mean())
     found = acceptance.disturbed(started, pushed[0] if pushed else np.nan, config)
-    found += told_to_turn(creature, champion, config, draw, threads)
+    found += steering_criteria(creature, champion, config, draw, threads)
     tested = sorted((*seen.criteria, *found), key=lambda c: c.number)
     report = acceptance.report(seen.whole, config) | {"ground": str(creature.terrain)}
     report |= _fell(np.split(outcome.fell, ends)[1])

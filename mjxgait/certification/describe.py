@@ -105,7 +105,7 @@ def pairs_of(window: Recording) -> list[tuple[int, int]]:
 def likeness(window: Recording, clearance: float) -> dict[str, float]:
     """Compare a walk with that of an animal with such legs at this speed.
 
-    stride, duty_factor: over the animal's. reach: see `standing`. pitch: mean deg of the nose above
+    stride, duty_factor: over the animal's. reach: see `stance_offset`. pitch: mean deg of the nose above
     the horizon. patter: see `patter`; an animal has none.
     clearance: rise of a foot in a swing, in hip heights.
     """
@@ -114,7 +114,7 @@ def likeness(window: Recording, clearance: float) -> dict[str, float]:
     return {
         "stride": float(stride / animal_stride(v, hip)) if v > 0 else np.nan,
         "duty_factor": float(window.contact.mean() / animal_duty(v, hip)),
-        "reach": standing(window),
+        "reach": stance_offset(window),
         "pitch": -float(np.degrees(window.pitch.mean())),
         "patter": patter(window),
     }
@@ -126,10 +126,10 @@ def in_words(report: Mapping[str, Any]) -> str | None:
     stride, duty = found.get("stride"), found.get("duty_factor")
     if stride is None or duty is None or not np.isfinite([stride, duty]).all():
         return None
-    told = f"Strides are {stride:.2f} and duty factors {duty:.2f} of an animal's at this speed"
+    sentence = f"Strides are {stride:.2f} and duty factors {duty:.2f} of an animal's at this speed"
     if (often := found.get("patter") or 0.0) < 0.5:
-        return f"{told}."
-    return f"{told}; in each of them a foot loses the floor for a moment {often:.1f} times."
+        return f"{sentence}."
+    return f"{sentence}; in each of them a foot loses the floor for a moment {often:.1f} times."
 
 
 def patter(window: Recording) -> float:
@@ -141,7 +141,7 @@ def patter(window: Recording) -> float:
     return float(np.maximum(touchdowns - swung, 0).mean() / strides)
 
 
-def standing(window: Recording) -> float:
+def stance_offset(window: Recording) -> float:
     """Mean offset of stance from its place at rest, forward or back, in hip heights.
 
     Each foot's offset is its mean over all frames in which it carries weight.

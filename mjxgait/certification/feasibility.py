@@ -21,7 +21,7 @@ CROUCHES = (0.0, 0.1)
 SIDEWAYS = 0.05
 """Weight of a foot's way to the side: legs that swing about an upright axis move it in an arc."""
 MOST, HALVINGS = 1.0, 5
-"""Hip heights that a foot is asked to reach at most, and steps of the search below."""
+"""Greatest hip heights at which a foot's reach is tried, and steps of the search below."""
 SPENT = 0.9
 """Share of the torque limit that a step may take; balance and swings need the rest.
 

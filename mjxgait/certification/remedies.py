@@ -35,7 +35,7 @@ class Entry:
     order: int = USUAL
 
     def fits(self, criterion: Criterion, measure: Measure) -> bool:
-        """Tell whether the entry is about this measure."""
+        """Return whether the entry is about this measure."""
         named = fnmatch.fnmatchcase(criterion.name, self.criterion)
         return named and fnmatch.fnmatchcase(measure.name, self.measure)
 

@@ -23,21 +23,6 @@ from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.starts import Starts, perturbed_starts, pushed_starts
 
 
-def sloping(creature: Creature, angle: float) -> Creature:
-    """Return the creature on ground that rises forward by `angle` rad; a negative angle descends.
-
-    Gravity is tilted, not the floor: heights are perpendicular to the slope, and the balance
-    correction takes the slope for level.
-    """
-    model = copy.copy(creature.model)
-    forward = (creature.frame.stand_rot @ creature.frame.forward) * [1.0, 1.0, 0.0]
-    forward /= np.linalg.norm(forward)
-    model.opt.gravity[:] = model.opt.gravity[2] * (
-        np.sin(angle) * forward + [0.0, 0.0, np.cos(angle)]
-    )
-    return dataclasses.replace(creature, model=model)
-
-
 def slippery(creature: Creature, friction: float) -> Creature:
     """Return the creature with this coefficient of sliding friction at every contact."""
     model = copy.copy(creature.model)

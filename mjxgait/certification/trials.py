@@ -138,7 +138,7 @@ def simulate(
     return stepping.to_the_end(steps, commanded, None if watch is None else watch.tell)
 
 
-def told_to_turn(
+def steering_criteria(
     creature: Creature, champion: Champion, config: CertificateConfig, draw: Draw, threads: int
 ) -> tuple[Criterion, ...]:
     """Evaluate steering by drawn headings from perturbed starts; empty if none are commanded."""
@@ -202,7 +202,7 @@ def rehearse(
     reached = margin(np.where(np.arange(len(begun)) < count, succeeded, outcome.stayed_up))
     if reached < wanted:
         return reached
-    return min(reached, _worst(told_to_turn(creature, champion, config, draw, threads)))
+    return min(reached, _worst(steering_criteria(creature, champion, config, draw, threads)))
 
 
 def _cautious(well: np.ndarray, caution: float) -> float:

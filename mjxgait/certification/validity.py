@@ -151,8 +151,8 @@ def _read(path: Path, schema: type, command: str) -> dict[str, Any] | None:
     try:
         document = read_json(path)
     except DamagedFile as error:
-        told = str(error).removeprefix(f"{path}: ")
-        raise DamagedFile(f"{path}: not {_NAMES[command]}: {told}; {cure}") from None
+        message = str(error).removeprefix(f"{path}: ")
+        raise DamagedFile(f"{path}: not {_NAMES[command]}: {message}; {cure}") from None
     check(schema, document, f"{path}: not {_NAMES[command]}", cure)
     return dict(document)
 

@@ -21,7 +21,7 @@ from mjxgait.config.tables import (
     build,
     check,
 )
-from mjxgait.controllers.key_poses.config import DriveConfig
+from mjxgait.controllers.config import DriveConfig
 from mjxgait.creature import Creature
 from mjxgait.creature.proportions import grown, proportions
 from mjxgait.errors import UserError
@@ -146,7 +146,7 @@ class Champion:
 def split_genome(genome: Genome) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
     """Return the controller's arrays by name, and the logarithms of the sizes [..., Z] or None.
 
-    Only genomes of `controllers.sized_body.Bodied` have sizes.
+    Only genomes of `controllers.base.Bodied` have sizes.
     """
     own = {n.removeprefix("plan."): a for n, a in genome.items() if n.startswith("plan.")}
     return (own, genome["sizes"]) if own else (dict(genome), None)
@@ -256,14 +256,14 @@ def read_champion(path: Path, creature: Creature) -> Champion:
         champion = _champion(document, creature, path)
         champion.check_finite(creature)
     except DamagedFile as error:
-        told = str(error).removeprefix(f"{path}: ")
-        raise DamagedChampion(f"{path}: damaged, or not a champion file ({told})") from None
+        message = str(error).removeprefix(f"{path}: ")
+        raise DamagedChampion(f"{path}: damaged, or not a champion file ({message})") from None
     except UserError as error:
-        told = str(error)
-        raise UserError(told if str(path) in told else f"{path}: {told}") from None
+        message = str(error)
+        raise UserError(message if str(path) in message else f"{path}: {message}") from None
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
-        told = reprlib.repr(str(error))
-        raise DamagedChampion(f"{path}: damaged, or not a champion file ({told})") from None
+        message = reprlib.repr(str(error))
+        raise DamagedChampion(f"{path}: damaged, or not a champion file ({message})") from None
     return champion
 
 

@@ -42,7 +42,8 @@ def check_command(arguments: Sequence[str]) -> int:
     grows = creature.settings.creature.grows
     if not grows:
         check_body(creature)
-    from mjxgait.importer.portrait import facts, portrait, standing
+    from mjxgait.importer.portrait import facts, portrait
+    from mjxgait.importer.stand_test import stand_test
 
     out = options.out or Path(f"{creature.name}-check.png")
     if out.suffix.lower() != ".png":
@@ -50,7 +51,7 @@ def check_command(arguments: Sequence[str]) -> int:
     require_writable(out)
     from mjxgait.physics import fallback_note
 
-    held = standing(creature)
+    held = stand_test(creature)
     print("\n".join(facts(creature, held)))
     if not grows:
         print("\n".join(feasibility(creature).lines()))

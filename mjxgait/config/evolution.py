@@ -195,7 +195,7 @@ class EvolutionConfig:
 
     @property
     def follows(self) -> bool:
-        """Tell whether mothers are recorded; children that a strategy draws have none."""
+        """Return whether mothers are recorded; children that a strategy draws have none."""
         return self.search == "ga" and (self.lineage or self.family < 1)
 
     @property

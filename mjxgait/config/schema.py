@@ -20,7 +20,8 @@ from mjxgait.config.tables import (
     Share,
     Whole,
 )
-from mjxgait.controllers.key_poses.config import DriveConfig, PoseConfig
+from mjxgait.controllers.config import DriveConfig
+from mjxgait.controllers.key_poses.config import PoseConfig
 from mjxgait.creature.ground.spec import FLAT, check_ground
 from mjxgait.tasks.walk.config import WalkConfig
 
@@ -127,12 +128,12 @@ class RolloutConfig:
 
     @property
     def promotes(self) -> bool:
-        """Tell whether only a share of the individuals runs all starts."""
+        """Return whether only a share of the individuals runs all starts."""
         return self.promote < 1 and self.starts > 1
 
     @property
     def uneven(self) -> bool:
-        """Tell whether perturbed starts have uneven ground of their own."""
+        """Return whether perturbed starts have uneven ground of their own."""
         return bool(self.slope or self.rough)
 
 

@@ -37,7 +37,7 @@ class HostOnly:
 
 
 def chosen(value: str | Choice, option: str) -> jax.Array:
-    """Tell whether [] a choice of the config, plain or traced, is this option."""
+    """Return whether [] a choice of the config, plain or traced, is this option."""
     if isinstance(value, Choice):
         return value.index == value.options.index(option)
     return jnp.asarray(value == option)

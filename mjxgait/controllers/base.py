@@ -56,7 +56,7 @@ class Controller(Protocol[Settings_contra, Genome, Plan, Memory]):
 
     @property
     def every(self) -> int:
-        """Control steps per command, one of `key_poses.config.HOLDS`; in between it is held."""
+        """Control steps per command, one of `controllers.config.HOLDS`; in between it is held."""
         ...
 
     def variation(self, settings: Settings_contra, evolution: EvolutionConfig) -> Variation[Genome]:

@@ -16,7 +16,7 @@ from jax.typing import ArrayLike
 
 from mjxgait.config.traced import chosen
 from mjxgait.controllers.base import Command
-from mjxgait.controllers.key_poses.config import DriveConfig
+from mjxgait.controllers.config import DriveConfig
 from mjxgait.creature.body import Body
 from mjxgait.types import BodyState, Plant, Sensed, pytree
 

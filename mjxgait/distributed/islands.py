@@ -288,10 +288,10 @@ class _Islands:
         every = self.settings.every
         if not known or not every or self.generation % every or len(known) == 1:
             return self.states
-        append_lines(self.folder / MIGRATIONS, self._told(known))
+        append_lines(self.folder / MIGRATIONS, self._migration_lines(known))
         return list(exchanged(known, self.settings))
 
-    def _told(self, states: list[Packed]) -> Lines:
+    def _migration_lines(self, states: list[Packed]) -> Lines:
         best = [state.arrays["fitness"][: self.settings.migrants].tolist() for state in states]
         return [
             {"generation": self.generation, "from": source, "to": island, "fitness": best[source]}

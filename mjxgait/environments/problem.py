@@ -22,10 +22,10 @@ from mjxgait.errors import UserError
 from mjxgait.plugins import make_task
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import what_ends
-from mjxgait.simulation.rollout import CHECK_EVERY, choose, deepened, is_going, reason_of
+from mjxgait.simulation.rollout import CHECK_EVERY, deepened, is_going, reason_of
 from mjxgait.tasks.base import FINISHED, EpisodeStats, Task, in_order
 from mjxgait.tasks.starts import Starts
-from mjxgait.types import Sensed, pytree
+from mjxgait.types import Sensed, choose, pytree
 
 OBSERVED = (
     "joint_pos",

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.traced import Choice, chosen
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Tree
+from mjxgait.types import Tree, choose
 
 TRIES = 16
 """Draws of a child that must be new; if all give existing genomes, the first is mutated."""
@@ -106,7 +106,7 @@ class Nursery:
         first = jnp.argmax(new)
         child = jax.tree.map(lambda leaf: leaf[first], drawn)
         mutant = self.variation.mutate(key_mutate, child)
-        return _either(new[first], child, mutant), new[first] & of_two[first]
+        return choose(new[first], child, mutant), new[first] & of_two[first]
 
     def _draw(self, key: jax.Array, pool: Tree, among: jax.Array | int) -> tuple[Tree, jax.Array]:
         """Return a child of two or one of the first `among`, and whether it has two parents []."""
@@ -117,12 +117,12 @@ class Nursery:
             for place in parents(key_parents, 1, among, config.selection, config.rivals)
         )
         crosses = jax.random.bernoulli(key_whether, config.crossover)
-        child = _either(crosses, self.variation.cross(key_cross, mother, father), mother)
+        child = choose(crosses, self.variation.cross(key_cross, mother, father), mother)
         # As in simultaneous breeding: a child of one parent is always mutated, unless rate 0.
         mutates = jax.random.bernoulli(key_mutated, config.mutation_rate) | (
             ~crosses & (jnp.asarray(config.mutation_rate) > 0)
         )
-        return _either(mutates, self.variation.mutate(key_mutate, child), child), crosses
+        return choose(mutates, self.variation.mutate(key_mutate, child), child), crosses
 
 
 def _with_room(leaf: jax.Array, count: int) -> jax.Array:
@@ -130,14 +130,10 @@ def _with_room(leaf: jax.Array, count: int) -> jax.Array:
 
 
 def _holds(pool: object, size: jax.Array, genome: object) -> jax.Array:
-    """Tell whether [] one of the first `size` of a pool equals a genome."""
+    """Return whether [] one of the first `size` of a pool equals a genome."""
     same = [
         jnp.all(leaf == one, axis=tuple(range(1, leaf.ndim)))
         for leaf, one in zip(jax.tree.leaves(pool), jax.tree.leaves(genome), strict=True)
     ]
     everywhere = jnp.all(jnp.stack(same), axis=0)
     return jnp.any(everywhere & (jnp.arange(len(everywhere)) < size))
-
-
-def _either(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
-    return jax.tree.map(lambda a, b: jnp.where(condition, a, b), yes, no)

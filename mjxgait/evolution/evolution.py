@@ -13,9 +13,9 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.evolution.offspring import children, forced, pick_rows
+from mjxgait.evolution.offspring import children, forced
 from mjxgait.evolution.state import (
-    NOBODY,
+    NO_MOTHER,
     EvolutionState,
     GenerationMetrics,
     Origin,
@@ -26,7 +26,7 @@ from mjxgait.evolution.state import (
 from mjxgait.evolution.strategy import Normal, SeparableCma
 from mjxgait.evolution.survival import Survival, pooled, together
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Evaluation
+from mjxgait.types import Evaluation, Tree, choose
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class Evolution:
         return min(self.config.population, self.config.offspring), state.stale
 
     def _stay(self, state: EvolutionState) -> jax.Array:
-        """Tell whether [] parents survive although otherwise only children do.
+        """Return whether [] parents survive although otherwise only children do.
 
         A forced generation replaces only the worst of the population. Its parents keep the fitness
         of the generation before.
@@ -139,18 +139,16 @@ class Evolution:
         survival = Survival(self.config, self.variation, now if again else None, self._stay(state))
         grown, mothers = survival.survivors(state, proposal, pool, fitness, evaluation.terms)
         planted = self._plant(state, proposal, evaluation, generation)
-        state = jax.tree.map(
-            lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
-        )
+        state = choose(seeding, _without_key(planted), _without_key(grown))
         was_forced = state.forced
         state = dataclasses.replace(state, key=proposal.key, generation=generation)
         normal = self._learnt(state, proposal, evaluation, seeding)
         state = dataclasses.replace(state, normal=normal)
         state = decided(self.config, state)
-        told = None
+        logged = None
         if self.config.lineage and mothers is not None:
-            told = jnp.where(seeding, NOBODY, mothers)
-        return state, metrics(self.config, state, evaluation, was_forced, told)
+            logged = jnp.where(seeding, NO_MOTHER, mothers)
+        return state, metrics(self.config, state, evaluation, was_forced, logged)
 
     @property
     def _strategy(self) -> SeparableCma:
@@ -228,21 +226,21 @@ class Evolution:
         keys_forced = jax.random.split(key_forced, 2 + self.config.forced.mutations)
         created = self.variation.create(keys_forced[0], self.config.offspring)
         known = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
-        initial = pick_rows(places < self.config.population, known, created)
+        initial = choose(places < self.config.population, known, created)
         bred, child_origin, of_child = self._children(key_children, state)
         mutants, forced_origin, of_mutant = forced(
             keys_forced[1:], self.config, self.variation, state, created
         )
 
-        def pick(first: jax.Array, second: jax.Array, third: jax.Array) -> jax.Array:
-            return jnp.where(seeding, first, jnp.where(state.forced, second, third))
+        def pick(first: Tree, second: Tree, third: Tree) -> Tree:
+            return choose(seeding, first, choose(state.forced, second, third))
 
-        genomes = jax.tree.map(pick, initial, mutants, bred)
+        genomes = pick(initial, mutants, bred)
         origin = pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
         if not self.config.follows or of_child is None:
             return genomes, origin, None
-        of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NOBODY, of_mutant)
-        return genomes, origin, pick(jnp.full_like(origin, NOBODY), of_mutant, of_child)
+        of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NO_MOTHER, of_mutant)
+        return genomes, origin, pick(jnp.full_like(origin, NO_MOTHER), of_mutant, of_child)
 
     def _children(
         self, key: jax.Array, state: EvolutionState

@@ -10,7 +10,7 @@ from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.evolution.breeding import Nursery, parents, proportional_parents
 from mjxgait.evolution.state import EvolutionState, Origin
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Tree
+from mjxgait.types import choose
 
 
 def children(
@@ -33,14 +33,14 @@ def children(
     )
     crossed = jax.vmap(variation.cross)(jax.random.split(key_cross, count), mother, father)
     crosses = jax.random.bernoulli(key_whether, config.crossover, (count,))
-    child = pick_rows(crosses, crossed, mother)
+    child = choose(crosses, crossed, mother)
     mutated = jax.vmap(variation.mutate)(jax.random.split(key_mutate, count), child)
     # An unmutated child of one parent would be a duplicate; at rate 0 it is kept.
     mutates = jax.random.bernoulli(key_mutated, config.mutation_rate, (count,)) | (
         ~crosses & (config.mutation_rate > 0)
     )
     origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
-    return pick_rows(mutates, mutated, child), origin, mothers
+    return choose(mutates, mutated, child), origin, mothers
 
 
 def forced(
@@ -64,12 +64,5 @@ def forced(
 
     mutants, _ = jax.lax.scan(mutated, mutants, keys[1:])
     is_new = jnp.arange(count) < newcomers
-    genomes = pick_rows(is_new, created, mutants)
+    genomes = choose(is_new, created, mutants)
     return genomes, jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)), drawn
-
-
-def pick_rows(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
-    """Choose row by row [M] from one of two pytrees of leaves [M, ...]."""
-    return jax.tree.map(
-        lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no
-    )

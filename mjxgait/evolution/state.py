@@ -12,7 +12,7 @@ from mjxgait.evolution.strategy import Normal
 from mjxgait.evolution.variation import first_occurrence
 from mjxgait.types import Evaluation, pytree
 
-NOBODY = -1
+NO_MOTHER = -1
 """Mother's place of an individual without a mother, or with an unknown one."""
 
 
@@ -108,7 +108,7 @@ class Proposal:
     """Offspring that a generation submits for evaluation.
 
     key: of the next generation. offspring: leaves [M, ...]; origin, born: [M]. mothers: [M] places
-    of their first parents, or `NOBODY`; None where that is not recorded.
+    of their first parents, or `NO_MOTHER`; None where that is not recorded.
     """
 
     key: jax.Array

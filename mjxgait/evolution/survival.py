@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.traced import chosen
-from mjxgait.evolution.state import NOBODY, EvolutionState, Proposal, admitted
+from mjxgait.evolution.state import NO_MOTHER, EvolutionState, Proposal, admitted
 from mjxgait.evolution.variation import Variation, first_occurrence
 from mjxgait.types import Evaluation, Tree, pytree
 
@@ -54,7 +54,7 @@ def families(state: EvolutionState, mothers: jax.Array | None) -> jax.Array | No
     population, offspring = len(state.family), len(mothers)
     own = population + (state.generation + 2) * offspring + jnp.arange(offspring)
     theirs = state.family[jnp.maximum(mothers, 0)]
-    return jnp.append(state.family, jnp.where(mothers == NOBODY, own, theirs))
+    return jnp.append(state.family, jnp.where(mothers == NO_MOTHER, own, theirs))
 
 
 def place_in_family(family: jax.Array, rank: jax.Array, counts: jax.Array) -> jax.Array:
@@ -83,7 +83,7 @@ def first_of_kind(
     verdicts: jax.Array,
     anew: jax.Array,
 ) -> jax.Array:
-    """Tell for each of the old and the offspring [P + M] whether it is the first of its kind.
+    """Return for each of the old and the offspring [P + M] whether it is the first of its kind.
 
     An individual evaluated again comes before its old self. Of equal results, a child comes before
     its parent, so that neutral mutations drift.
@@ -112,7 +112,7 @@ def together(old: Tree, new: Tree) -> Tree:
 
 
 def _new_first(old: object, new: object) -> jax.Array:
-    """Tell for each of both [P + M] whether it is the first of its kind, the new before the old."""
+    """Return for each of both [P + M] whether it is the first of its kind, the new before the old."""
     return jnp.roll(first_occurrence(together(new, old)), len(jax.tree.leaves(old)[0]))
 
 

@@ -157,7 +157,7 @@ def jittered(
 
 
 def first_occurrence(genomes: object) -> jax.Array:
-    """Tell for each genome [N] (leaves [N, ...]) whether it is the first of its kind.
+    """Return for each genome [N] (leaves [N, ...]) whether it is the first of its kind.
 
     Sorts by a random projection, so the cost grows as N log N. Equal genomes have equal
     projections; neighbours are compared in full.

@@ -37,7 +37,7 @@ def movable_joints(
     notes: Notes,
 ) -> list[int]:
     """Joints that could be active; frozen ones are reported."""
-    joints, slides, told = [], [], []
+    joints, slides, frozen = [], [], []
     followers = _followers(model)
     for j in range(model.njnt):
         name, kind = model.joint(j).name, int(model.jnt_type[j])
@@ -46,7 +46,7 @@ def movable_joints(
         if kind == SLIDE:
             slides.append(name or f"joint {j}")
         elif any(fnmatch.fnmatchcase(name, pattern) for pattern in freeze):
-            told.append(name)
+            frozen.append(name)
         elif name not in coupled and j not in followers and kind != FREE:
             joints.append(j)
     if slides:
@@ -54,8 +54,8 @@ def movable_joints(
             f"slide joints {listed(slides)} frozen",
             "the controller's key poses are angles; a sliding limb keeps its length",
         )
-    if told:
-        notes.change(f"joints {listed(told)} frozen", "as given by --freeze")
+    if frozen:
+        notes.change(f"joints {listed(frozen)} frozen", "as given by --freeze")
     if followers:
         notes.change(
             f"joints {listed([model.joint(j).name for j in sorted(followers)])} frozen",

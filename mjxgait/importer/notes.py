@@ -69,8 +69,8 @@ def one_line(text: str) -> str:
     Control characters become spaces; bytes of a file name that are not Unicode become question
     marks.
     """
-    told = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
-    return re.sub(r"[\x00-\x1f\x7f-\x9f]", " ", told)
+    readable = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    return re.sub(r"[\x00-\x1f\x7f-\x9f]", " ", readable)
 
 
 def plain_names(names: list[str], fallback: list[str]) -> list[str]:

@@ -45,13 +45,13 @@ def yaw_to(forward: np.ndarray) -> np.ndarray:
 
 
 def find_forward(
-    kinematics: KinematicModel, q: np.ndarray, told: str | None, notes: Notes
+    kinematics: KinematicModel, q: np.ndarray, given: str | None, notes: Notes
 ) -> np.ndarray:
     """Forward unit vector [3] in the world of the pose."""
     xpos, _ = kinematics.pose(q)
-    if told:
-        notes.guess("forward", told, "high", "as given")
-        return FORWARDS[told]
+    if given:
+        notes.guess("forward", given, "high", "as given")
+        return FORWARDS[given]
     name, sure, why = _axis(kinematics, q)
     sign, evidence = _front(kinematics, xpos, FORWARDS[name])
     if sign < 0:

@@ -5,7 +5,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from mjxgait.creature import Creature
-from mjxgait.importer.balance import Held, hold
+from mjxgait.importer.stand_test import Held
 from mjxgait.rendering.floor import DARK_INK, Camera, font
 from mjxgait.rendering.painter import Painter, paint
 from mjxgait.rendering.shapes import Silhouettes
@@ -30,22 +30,6 @@ PAIRS = (
     (60, 60, 60),
 )
 ALONE = (255, 255, 255)
-
-
-def standing(creature: Creature) -> Held:
-    """Run the stand test for two seconds."""
-    feet = {
-        creature.model.geom(int(g)).name
-        for g in [*creature.feet.watched[: len(creature.feet.foot_of)], *creature.feet.ground]
-    }
-    return hold(
-        creature.model,
-        creature.stand_qpos,
-        creature.gains.kp,
-        creature.gains.kd,
-        creature.gains.torque_limit,
-        feet,
-    )
 
 
 def facts(creature: Creature, held: Held) -> list[str]:

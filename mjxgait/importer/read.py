@@ -7,7 +7,8 @@ from pathlib import Path
 from mjxgait.animation.clips.clip import ELSEWHERE
 from mjxgait.errors import UserError
 from mjxgait.files import read_bytes
-from mjxgait.importer.clean import clean_mjcf, clean_urdf
+from mjxgait.importer.clean_mjcf import clean_mjcf
+from mjxgait.importer.clean_urdf import clean_urdf
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.rigged import RIGS, model_of
 from mjxgait.importer.source import MOST_XML, Places, Source, parse_text, parse_xml

@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 
 from mjxgait.importer.anatomy import HINGE, Anatomy
-from mjxgait.importer.balance import Held, hold
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.drive import Drive, plan_drive
 from mjxgait.importer.notes import Notes
@@ -25,6 +24,7 @@ from mjxgait.importer.stance import (
     level,
     stance_of,
 )
+from mjxgait.importer.stand_test import Held, hold
 
 SINK = 0.0005
 """m, initial depth of the feet in the floor, about as deep as they rest."""

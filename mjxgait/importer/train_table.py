@@ -59,7 +59,7 @@ the usual one they gallop.
 
 Settings = dict[str, Any]
 """Tables of settings, as in creature.toml below `[train]`."""
-Told = tuple[str, Confidence, str]
+Choice = tuple[str, Confidence, str]
 """The choice, its confidence and its reason."""
 
 
@@ -101,27 +101,27 @@ class Traits:
 def train_table(body: Traits, notes: Notes) -> Settings:
     """Return the table `[train]` of an imported creature, and report its reason."""
     if body.steps:
-        settings, told = few_feet(body)
+        settings, choice = few_feet(body)
     elif body.hinges > MANY * body.legs:
-        settings, told = many_hinges(body)
+        settings, choice = many_hinges(body)
     else:
-        settings, told = four_feet(body)
+        settings, choice = four_feet(body)
     if body.skeleton and body.steps:
         settings["rollout"]["seconds"] = LONG
         settings["fitness"]["weights"]["overlap"] = CROSSED
-        told = (f"{told[0]}; episodes of {LONG:g} s; parts within each other cost", *told[1:])
+        choice = (f"{choice[0]}; episodes of {LONG:g} s; parts within each other cost", *choice[1:])
     elif body.skeleton:
         settings["fitness"]["speed"] = LEISURE
         settings["fitness"]["weights"]["patter"] = FLICKER
-        told = (f"{told[0]}; feet that flicker cost; {LEISURE:g} body lengths/s", *told[1:])
-    notes.guess("train", *told)
+        choice = (f"{choice[0]}; feet that flicker cost; {LEISURE:g} body lengths/s", *choice[1:])
+    notes.guess("train", *choice)
     table: Settings = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings
     if not body.symmetric:
         table.setdefault("controller", {})["key_poses"] = 2 * Config().controller.key_poses
     return table
 
 
-def four_feet(body: Traits) -> tuple[Settings, Told]:
+def four_feet(body: Traits) -> tuple[Settings, Choice]:
     """Settings of a body that stands on its feet.
 
     A foot of a body that bounces counts as down if it bears weight, because a foot near the floor
@@ -137,7 +137,7 @@ def four_feet(body: Traits) -> tuple[Settings, Told]:
     return {"fitness": fitness}, (what, "high", why)
 
 
-def many_hinges(body: Traits) -> tuple[Settings, Told]:
+def many_hinges(body: Traits) -> tuple[Settings, Choice]:
     """Settings of a body that stands on its feet, but in few poses of many."""
     settings, (what, _, _) = four_feet(body)
     settings["fitness"]["weights"] |= {"alive": ALIVE, "frequency": HASTY}
@@ -148,7 +148,7 @@ def many_hinges(body: Traits) -> tuple[Settings, Told]:
     return settings, (what, "medium", why)
 
 
-def few_feet(body: Traits) -> tuple[Settings, Told]:
+def few_feet(body: Traits) -> tuple[Settings, Choice]:
     """Settings of a body that must step to catch a fall."""
     hertz = BRISK * body.length / (STRIDE * body.hip)
     calm = min(WalkConfig().frequency, hertz / stride_limit(body.mass))

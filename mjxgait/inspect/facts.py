@@ -87,13 +87,15 @@ def certificate(snapshot: Snapshot) -> str:
     found = verdict_of(document)
     if not found.passed:
         failed = " ".join(map(str, found.numbers))
-        told = f"fails criteria {failed}" if failed else "is not certified: there are no criteria"
-        return f"The champion {told}{f'; {found.reservation}' if found.reservation else ''}."
+        failure = (
+            f"fails criteria {failed}" if failed else "is not certified: there are no criteria"
+        )
+        return f"The champion {failure}{f'; {found.reservation}' if found.reservation else ''}."
     if found.reservation:
         return f"The champion is not certified: it passes, but {found.reservation}."
     like = in_words(document.get("report", {}))
-    told = f"margin {found.margin:.2f}.{f' {like}' if like else ''}"
-    return f"The champion is certified, {told}{_anywhere(snapshot)}"
+    details = f"margin {found.margin:.2f}.{f' {like}' if like else ''}"
+    return f"The champion is certified, {details}{_anywhere(snapshot)}"
 
 
 def _anywhere(snapshot: Snapshot) -> str:

@@ -24,8 +24,8 @@ def runs_in(folder: Path) -> list[Path]:
 
 def just_begun(path: Path) -> dict[str, object] | None:
     """Return the summary of a running run without a checkpoint; None for others."""
-    who = None if stored_generations(path) else running(path)
-    return {"run": str(path), "problem": None, "running": who} if who else None
+    process = None if stored_generations(path) else running(path)
+    return {"run": str(path), "problem": None, "running": process} if process else None
 
 
 def print_just_begun(line: Facts, console: Console) -> None:

@@ -170,10 +170,12 @@ def island_facts(run: Path, last: int) -> list[IslandRow]:
 
     arrived: number of migrants. ahead: number of exchanges with a migrant above the island's best.
     """
-    told = [line for line in read_records(run / MIGRATIONS, _Exchange) if line["generation"] < last]
+    exchanges = [
+        line for line in read_records(run / MIGRATIONS, _Exchange) if line["generation"] < last
+    ]
     known = [folder for folder in (run / ISLANDS).glob("*/") if is_number(folder.name)]
     folders = sorted(known, key=lambda folder: int(folder.name))
-    return [row for folder in folders if (row := _row(folder, told, last))]
+    return [row for folder in folders if (row := _row(folder, exchanges, last))]
 
 
 def print_islands(rows: Sequence[IslandRow], console: Console) -> None:
@@ -190,12 +192,12 @@ def print_islands(rows: Sequence[IslandRow], console: Console) -> None:
     console.print(table)
 
 
-def _row(folder: Path, told: Sequence[Line], last: int) -> IslandRow | None:
+def _row(folder: Path, exchanges: Sequence[Line], last: int) -> IslandRow | None:
     lines = [line for line in read_metrics(folder / METRICS) if line["generation"] <= last]
     if not lines:
         return None
     island = int(folder.name)
-    come = [line for line in told if line["to"] == island]
+    come = [line for line in exchanges if line["to"] == island]
     best = {line["generation"]: line["best"] for line in lines}
     return {
         "island": island,

@@ -1,10 +1,8 @@
 """Batched rigid-body physics behind the `Plant` protocol."""
 
-import copy
 from typing import TypeVar
 
 import mujoco
-from numpy.typing import ArrayLike
 
 from mjxgait.config.schema import Physics
 from mjxgait.creature import Creature
@@ -67,18 +65,6 @@ def parameters_of(
         raise UserError(
             f"{creature.name} needs a program of its own, for its topology is another: {reason}"
         ) from None
-
-
-def heavier_model(model: mujoco.MjModel, factor: ArrayLike) -> mujoco.MjModel:
-    """Return a copy with masses and inertias times factor, [] or [nbody - 1].
-
-    MuJoCo recomputes what follows from them (`mj_setConst`).
-    """
-    heavy = copy.deepcopy(model)
-    heavy.body_mass[1:] *= factor
-    heavy.body_inertia[1:] = (heavy.body_inertia[1:].T * factor).T
-    mujoco.mj_setConst(heavy, mujoco.MjData(heavy))
-    return heavy
 
 
 def fallback_note(model: mujoco.MjModel) -> str:

@@ -56,25 +56,25 @@ class MjxPlant:
     def parameters_of(
         self, model: mujoco.MjModel, layout: ObservationLayout, crossings: Crossings | None = None
     ) -> ModelNumbers:
-        """See `Plant.parameters_of`."""
+        """See `ModelPlant.parameters_of`."""
         device_model = mjx.put_model(model, impl="jax")
-        told = model_difference(self.model, device_model)
-        told = told or _sense_difference(self.layout, layout, self.crossings, crossings)
-        if told:
-            raise OtherTopology(told)
+        reason = model_difference(self.model, device_model)
+        reason = reason or _sense_difference(self.layout, layout, self.crossings, crossings)
+        if reason:
+            raise OtherTopology(reason)
         # In NumPy, because an array of MJX belongs to one device.
         return jax.device_get(read_numbers(model, device_model, layout, crossings))
 
     def with_parameters(self, parameters: ModelNumbers) -> Self:
-        """See `Plant.with_parameters`."""
+        """See `ModelPlant.with_parameters`."""
         return dataclasses.replace(self, parameters=parameters)
 
     def with_mass_scale(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
-        """See `Plant.with_mass_scale`."""
+        """See `ModelPlant.with_mass_scale`."""
         return reweighed(self.model, self.data, with_mass_scale(parameters, factor))
 
     def with_length_scale(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
-        """See `Plant.with_length_scale`."""
+        """See `ModelPlant.with_length_scale`."""
         large = with_length_scale(self.model, self.layout, self.crossings, parameters, factor)
         return reweighed(self.model, self.data, large)
 

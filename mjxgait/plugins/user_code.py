@@ -21,7 +21,7 @@ from mjxgait.certification.acceptance import HasCriteria, PlainCriteria
 from mjxgait.champion import Champion
 from mjxgait.config.schema import UseConfig
 from mjxgait.config.tables import build
-from mjxgait.controllers.key_poses.config import holds
+from mjxgait.controllers.config import holds
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.kinds import ControllerKind, TaskKind, register, shipped

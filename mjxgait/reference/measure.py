@@ -64,7 +64,7 @@ class Recording:
     heading: [T] rad of the trunk, left of the start's forward, without jumps.
     goal: m ahead of the start; 0 if the task has none.
     light: [3] m, place in the world; None if the task has none.
-    clearance: [T] m to the bar, `bar.FAR` at most; None if the task has none.
+    clearance: [T] m to the bar, `layout.FAR` at most; None if the task has none.
     grown: additional measurements of a modular body; None for others.
     foot_ahead: [T, N] m along the trunk's nose from the trunk to the foot; None if not measured.
     overlap_pairs: names of the P pairs of parts that ever overlap. overlap: [T, P] m, depth.

@@ -197,7 +197,10 @@ def batch_of(creature: Creature, model: mujoco.MjModel, starts: Starts, threads:
 
 
 def _gravity(model: mujoco.MjModel, slope: np.ndarray) -> np.ndarray:
-    """Return gravity [S, 3], tilted instead of the floor by slopes [S, 2]; see `worlds.sloping`."""
+    """Return gravity [S, 3], tilted instead of the floor by slopes [S, 2].
+
+    Heights are perpendicular to the slope, and the balance correction takes the slope for level.
+    """
     angle = np.linalg.norm(slope, axis=1, keepdims=True)
     uphill = slope / np.where(angle > 0, angle, 1.0)
     change = np.concatenate([-np.sin(angle) * uphill, 1 - np.cos(angle)], 1)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
-from mjxgait.controllers.key_poses.config import DriveConfig
+from mjxgait.controllers.config import DriveConfig
 from mjxgait.creature import Creature
 from mjxgait.reference.controllers import Command
 from mjxgait.reference.layout import Ground, StartFrame, level_nose

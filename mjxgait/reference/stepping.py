@@ -41,18 +41,18 @@ def examined_model(creature: Creature) -> mujoco.MjModel:
 
 
 class Around(Protocol):
-    """Properties of the task that a simulation needs; see `tasks.AcceptanceCriteria`."""
+    """Properties of the task that a simulation needs; see `acceptance.AcceptanceCriteria`."""
 
     drag: float
     grown: bool
     leaps: bool
 
     def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """See `tasks.AcceptanceCriteria`."""
+        """See `acceptance.AcceptanceCriteria`."""
         ...
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `tasks.AcceptanceCriteria`."""
+        """See `acceptance.AcceptanceCriteria`."""
         ...
 
 

@@ -155,7 +155,7 @@ LEAST_SCALE = 0.05
 class Stage:
     """A scene: walks in lanes side by side, the first one nearest, seen from the side.
 
-    Frames are control steps of the first walk. view: a name in `camera.VIEWS`; by default slightly
+    Frames are control steps of the first walk. view: a name in `floor.VIEWS`; by default slightly
     from the front and from above.
     """
 

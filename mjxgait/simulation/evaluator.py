@@ -12,7 +12,7 @@ from mjxgait.config.schema import Config
 from mjxgait.simulation.rollout import Episodes, Simulator
 from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, in_order
 from mjxgait.tasks.starts import Starts
-from mjxgait.types import Evaluation, RequestedTrials
+from mjxgait.types import Evaluation, RequestedTrials, choose
 
 
 class Evaluator(Protocol):
@@ -81,15 +81,11 @@ class Local:
 
 def completed(evaluation: Evaluation, requested: RequestedTrials) -> Evaluation:
     """Fill in the known results of the trials that were not run; all leaves [B, ...]."""
-
-    def pick(new: jax.Array, known: jax.Array) -> jax.Array:
-        wanted = jnp.asarray(requested.wanted)
-        return jnp.where(wanted.reshape(*wanted.shape, *[1] * (new.ndim - wanted.ndim)), new, known)
-
+    wanted, known = requested.wanted, requested.known
     return Evaluation(
-        terms=pick(evaluation.terms, requested.known.terms),
-        outcome=pick(evaluation.outcome, requested.known.outcome),
-        failed=pick(evaluation.failed, requested.known.failed),
-        sim_steps=evaluation.sim_steps + requested.known.sim_steps,
-        computed_steps=evaluation.computed_steps + requested.known.computed_steps,
+        terms=choose(wanted, evaluation.terms, known.terms),
+        outcome=choose(wanted, evaluation.outcome, known.outcome),
+        failed=choose(wanted, evaluation.failed, known.failed),
+        sim_steps=evaluation.sim_steps + known.sim_steps,
+        computed_steps=evaluation.computed_steps + known.computed_steps,
     )

@@ -23,13 +23,7 @@ from mjxgait.controllers.spd import Drive, Function, Rules, per_lane
 from mjxgait.creature.body import Body
 from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, Task
 from mjxgait.tasks.starts import Starts
-from mjxgait.types import (
-    BodyState,
-    Plant,
-    Sensed,
-    Tree,
-    pytree,
-)
+from mjxgait.types import BodyState, Plant, Sensed, choose, pytree
 
 CHECK_EVERY = 16
 """Steps between checks for free lanes, which cost about a step each, and for overlap of parts."""
@@ -118,8 +112,8 @@ class Simulator:
         )
         plans = jax.vmap(jax.vmap(self.controller.prepare, (0, None)))(genomes, settings.controller)
         turns = self._turns(plans, shape, wanted)
-        nobody = jnp.arange(total, len(dealt), dtype=jnp.int32)
-        jobs = dealt if turns is None else jnp.concatenate([turns, nobody])[dealt]
+        padding = jnp.arange(total, len(dealt), dtype=jnp.int32)
+        jobs = dealt if turns is None else jnp.concatenate([turns, padding])[dealt]
         if wanted is not None:
             jobs = jnp.where(dealt < jnp.sum(wanted), jobs, total)
         stats, computed = run(jobs, plans, starts, settings, self._own_starts(genomes, starts))
@@ -256,7 +250,7 @@ class Simulator:
 
     @property
     def _holds(self) -> bool:
-        """Tell whether a command is held for several steps."""
+        """Return whether a command is held for several steps."""
         return self.controller.every > 1
 
     def _step(self, k: jax.Array, lane: Lane) -> Lane:
@@ -341,7 +335,7 @@ def reason_of(task: Task, sensed: Sensed, goal: object) -> jax.Array:
 
 
 def is_going(stats: EpisodeStats, steps: int) -> jax.Array:
-    """Tell whether [] an episode of so many steps has not ended."""
+    """Return whether [] an episode of so many steps has not ended."""
     return (stats.reason == FINISHED) & (stats.steps < steps)
 
 
@@ -352,11 +346,6 @@ def deepened(stats: EpisodeStats, depth: jax.Array, steps: int) -> EpisodeStats:
     """
     deeper = is_going(stats, steps) & (depth > stats.overlap)
     return dataclasses.replace(stats, overlap=jnp.where(deeper, depth, stats.overlap))
-
-
-def choose(condition: jax.Array, yes: Tree, no: Tree) -> Tree:
-    """Return one of two pytrees by a condition []."""
-    return jax.tree.map(partial(jnp.where, condition), yes, no)
 
 
 def _push(lane: Lane) -> BodyState:

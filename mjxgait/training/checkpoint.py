@@ -204,7 +204,7 @@ class Checkpoints:
         )
         with disk_errors(self._folder):
             self._begun.result()
-            # Told before anything of it is written.
+            # Raises before anything of it is written.
             try_room(self._folder, 2 * packed.size + OVERHEAD)
         # Orbax writes in the background, but starting takes it a tenth of a generation.
         self._begun = self._beginner.submit(

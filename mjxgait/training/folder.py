@@ -31,7 +31,7 @@ from mjxgait.config.tables import (
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.proportions import extreme_bodies
 from mjxgait.errors import NotLoaded, UserError
-from mjxgait.evolution.state import NOBODY
+from mjxgait.evolution.state import NO_MOTHER
 from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, read_text, write_text, writing
 from mjxgait.plugins import build_config
 from mjxgait.plugins.fit import check_fit
@@ -320,12 +320,12 @@ def mothers_line(lines: Sequence[Mapping[str, Any]], generation: int, place: int
     """
     known = {line["generation"]: line[MOTHERS] for line in lines if MOTHERS in line}
     found = {generation: place}
-    while (mother := _mother(known.get(generation, ()), place)) != NOBODY:
+    while (mother := _mother(known.get(generation, ()), place)) != NO_MOTHER:
         generation, place = generation - 1, mother
         found[generation] = place
     return found
 
 
 def _mother(places: Sequence[int], place: int) -> int:
-    """Return the place of an individual's mother; `NOBODY` if the log does not have it."""
-    return places[place] if 0 <= place < len(places) else NOBODY
+    """Return the place of an individual's mother; `NO_MOTHER` if the log does not have it."""
+    return places[place] if 0 <= place < len(places) else NO_MOTHER

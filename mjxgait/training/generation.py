@@ -15,7 +15,7 @@ import numpy as np
 from mjxgait.config.schema import Config
 from mjxgait.evolution.evolution import Evolution
 from mjxgait.evolution.state import (
-    NOBODY,
+    NO_MOTHER,
     EvolutionState,
     GenerationMetrics,
     Proposal,
@@ -26,7 +26,7 @@ from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.base import Task, in_order, score
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.spec import BodyParams, SimulatorSpec
-from mjxgait.types import Evaluation, RequestedTrials, pytree
+from mjxgait.types import Evaluation, RequestedTrials, choose, pytree
 
 LEADERS = 16
 """Number of a row's best individuals that decide on the next curriculum level."""
@@ -99,12 +99,11 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
 
     def seated(children: jax.Array, best: jax.Array) -> jax.Array:
         guests, last = best[sources, rank % best.shape[1]], children[:, -count:]
-        who = comes.reshape(*comes.shape, *[1] * (guests.ndim - 2))
-        return children.at[:, -count:].set(jnp.where(who, guests, last))
+        return children.at[:, -count:].set(choose(comes, guests, last))
 
     mothers = proposals.mothers
     if mothers is not None:
-        mothers = seated(mothers, jnp.full_like(states.origin, NOBODY))
+        mothers = seated(mothers, jnp.full_like(states.origin, NO_MOTHER))
     return dataclasses.replace(
         proposals,
         offspring=jax.tree.map(seated, proposals.offspring, states.genomes),
@@ -174,9 +173,9 @@ def absorb(
         given: tuple[RunParams, EvolutionState, Proposal, Evaluation],
     ) -> tuple[EvolutionState, GenerationMetrics]:
         row, state, proposal, evaluation = given
-        after, told = evolution_of(simulator, row.settings).absorb(state, proposal, evaluation)
+        after, logged = evolution_of(simulator, row.settings).absorb(state, proposal, evaluation)
         after = climbed(simulator.task, row.settings.fitness, after)
-        return after, dataclasses.replace(told, level=after.level)
+        return after, dataclasses.replace(logged, level=after.level)
 
     return jax.lax.map(of_row, (rows, states, proposals, evaluation))
 

@@ -230,5 +230,5 @@ def _outcome(last: Line) -> str:
     """Return the metrics of the best in m, s or counts, as text."""
     prefix = "outcome_"
     named = {k.removeprefix(prefix): v for k, v in last.items() if k.startswith(prefix)}
-    told = (f"{name} {'-' if value is None else f'{value:.2f}'}" for name, value in named.items())
-    return ", ".join(told) + " per episode, mean of the starts"
+    values = (f"{name} {'-' if value is None else f'{value:.2f}'}" for name, value in named.items())
+    return ", ".join(values) + " per episode, mean of the starts"

@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 from helpers import pose_champion
 
-from mjxgait.controllers.key_poses.config import DriveConfig, PoseConfig
+from mjxgait.controllers.config import DriveConfig
+from mjxgait.controllers.key_poses.config import PoseConfig
 from mjxgait.reference.measure import Dimensions, Recording
 
 LEG = """

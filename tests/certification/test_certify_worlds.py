@@ -1,28 +1,26 @@
 """Floors as steep and slippery as set, with nothing else changed."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certification.stress import slippery, sloping
+from mjxgait.certification.stress import slippery
 from mjxgait.certification.trials import simulate
+from mjxgait.creature import Creature
 from mjxgait.reference.outcome import Fall
-from mjxgait.reference.starts import perturbed_starts
+from mjxgait.reference.starts import Starts, batch_of, nominal_starts
 
 
-def rng(seed=0):
-    return np.random.default_rng(seed)
+def uphill(creature: Creature, *angles: float) -> Starts:
+    """One start for each angle in rad at which the floor rises along the world's x."""
+    slope = np.stack([angles, np.zeros(len(angles))], 1)
+    return dataclasses.replace(nominal_starts(creature, len(angles)), slope=slope)
 
 
-@pytest.mark.parametrize(
-    "world",
-    [
-        lambda c: sloping(c, 0.1),
-        lambda c: slippery(c, 0.4),
-    ],
-)
-def test_another_floor_does_not_change_the_body(tiny, world):
-    before, after = tiny.model.geom_friction.copy(), world(tiny).model
+def test_another_floor_does_not_change_the_body(tiny):
+    before, after = tiny.model.geom_friction.copy(), slippery(tiny, 0.4).model
     for field in (
         "body_mass",
         "body_inertia",
@@ -44,21 +42,18 @@ def test_another_floor_does_not_change_the_body(tiny, world):
 
 
 def test_a_slope_pulls_back_by_its_sine(tiny):
-    uphill = sloping(tiny, np.radians(30.0)).model.opt.gravity
-    assert uphill == pytest.approx([-9.81 / 2, 0, -9.81 * np.sqrt(3) / 2])
-    assert sloping(tiny, np.radians(-30.0)).model.opt.gravity[0] == pytest.approx(9.81 / 2)
+    steep = uphill(tiny, *np.radians([30.0, -30.0]))
+    up, down = batch_of(tiny, tiny.model, steep).expand("opt.gravity")
+    assert up == pytest.approx([-9.81 / 2, 0, -9.81 * np.sqrt(3) / 2])
+    assert down == pytest.approx([9.81 / 2, 0, -9.81 * np.sqrt(3) / 2])
 
 
 def test_a_standing_body_slides_if_friction_is_below_the_slope(tiny):
-    slope, starts = (
-        sloping(tiny, np.arctan(0.25)),
-        perturbed_starts(tiny, 2, rng(), friction=(1.0, 1.0)),
-    )
     held, slid = (
         simulate(
-            slippery(slope, friction),
+            slippery(tiny, friction),
             make_champion(tiny),
-            starts,
+            uphill(tiny, *[np.arctan(0.25)] * 2),
             1.5,
             fall=Fall(min_up=-1, height=(0, 5), touch=False),
         ).travel[:, 0]

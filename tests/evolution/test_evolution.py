@@ -19,7 +19,7 @@ from mjxgait.evolution.breeding import parents, proportional_parents
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.evolution import Evolution
 from mjxgait.evolution.state import (
-    NOBODY,
+    NO_MOTHER,
     EvolutionState,
     GenerationMetrics,
     Origin,
@@ -280,7 +280,7 @@ def test_place_in_lineage_follows_rank():
 
 def test_each_immigrant_starts_a_lineage():
     state = dataclasses.replace(begun(toy(**SPARING)), family=jnp.arange(20) // 2)
-    mothers = jnp.array([4, NOBODY, 5, NOBODY])
+    mothers = jnp.array([4, NO_MOTHER, 5, NO_MOTHER])
     old, new = np.split(np.asarray(families(state, mothers)), [20])
     assert (old == np.arange(20) // 2).all()
     assert new[[0, 2]].tolist() == [2, 2]
@@ -471,7 +471,7 @@ def test_the_log_names_each_individuals_mother():
     """Mutants of one joint resemble their mother more than any other individual."""
     following = toy(crossover=0.0, mutation="single", forced=NEVER)
     history, children = run(following, 12), 0
-    assert (history[0][1].mothers == NOBODY).all()
+    assert (history[0][1].mothers == NO_MOTHER).all()
     for (before, _), (after, metrics) in itertools.pairwise(history):
         mothers = before.genomes.key_poses[metrics.mothers]
         changed = (after.genomes.key_poses != mothers).sum(axis=(1, 2))

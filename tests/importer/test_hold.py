@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from mjxgait.creature import Creature
-from mjxgait.importer.balance import Held, hold
+from mjxgait.importer.stand_test import Held, hold
 
 
 def held(stool: Creature, without: str = "") -> Held:

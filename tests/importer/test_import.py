@@ -21,7 +21,8 @@ from mjxgait.config.layers import find_creature, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, Imported, import_model, stance
-from mjxgait.importer.portrait import facts, portrait, standing
+from mjxgait.importer.portrait import facts, portrait
+from mjxgait.importer.stand_test import stand_test
 from mjxgait.importer.write_toml import _quoted
 from mjxgait.reference.starts import perturbed_starts
 
@@ -55,7 +56,7 @@ def test_a_quadruped_stands_on_four_feet_and_knows_its_left_and_right(tmp_path):
     assert creature.mirror.symmetric
     names = creature.joints.names
     assert names[creature.mirror.partner[names.index("fl_knee")]] == "fr_knee"
-    assert standing(creature).stands
+    assert stand_test(creature).stands
     for words in (
         "free joint added",
         "sensor",
@@ -345,12 +346,12 @@ def test_the_command_writes_a_folder_and_check_draws_it(tmp_path, capsys):
 @pytest.mark.thorough("end_to_end/test_commands checks and draws each; the stool is drawn below")
 def test_every_shipped_creature_can_be_drawn(shipped):
     assert portrait(shipped).size == (1100, 760)
-    assert shipped.name in facts(shipped, standing(shipped))[0]
+    assert shipped.name in facts(shipped, stand_test(shipped))[0]
 
 
 def test_a_creature_can_be_drawn_and_told_of(stool: Creature):
     assert portrait(stool).size == (1100, 760)
-    assert stool.name in facts(stool, standing(stool))[0]
+    assert stool.name in facts(stool, stand_test(stool))[0]
 
 
 def test_check_fails_where_the_creature_does_not_stand(tmp_path, capsys):

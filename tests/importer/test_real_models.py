@@ -18,7 +18,7 @@ from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.convert import Imported
-from mjxgait.importer.portrait import standing
+from mjxgait.importer.stand_test import stand_test
 from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
 from mjxgait.physics.lane_major.model import check_supported
@@ -69,7 +69,7 @@ def test_file_to_standing_creature(tmp_path: Path, name: str):
     imported = imported_model(name)
     write_folder(tmp_path / "mine", imported)
     creature = load_creature(tmp_path / "mine")
-    assert standing(creature).stands == imported.stands == (name not in FALLS)
+    assert stand_test(creature).stands == imported.stands == (name not in FALLS)
     assert len(creature.feet.names) == FEET.get(name, len(creature.feet.names))
     assert creature.frame.mass == pytest.approx(MASS.get(name, creature.frame.mass), rel=1e-3)
     assert (creature.joints.pose_low <= creature.joints.stand + 1e-9).all()

@@ -5,11 +5,10 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from many_bodies import compiled, stacked
+from many_bodies import compiled, heavier_model, stacked
 
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
-from mjxgait.physics import heavier_model
 from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.types import BodyState, Plant

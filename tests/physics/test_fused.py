@@ -11,6 +11,7 @@ from many_bodies import (
     XML,
     compiled,
     everything,
+    heavier_model,
     in_front,
     layout_of,
     moments,
@@ -20,7 +21,6 @@ from many_bodies import (
 )
 
 from mjxgait.creature.overlap import Crossings, bar_places, pair_depths
-from mjxgait.physics import heavier_model
 from mjxgait.physics.lane_major import FastPlant, fast_plant
 
 TOE = '<geom name="toe" class="foot"'

@@ -9,10 +9,9 @@ import mujoco
 import numpy as np
 import pytest
 from jax.tree_util import keystr
-from many_bodies import XML, layout_of, stacked, varied
+from many_bodies import XML, heavier_model, layout_of, stacked, varied
 
 from mjxgait.creature import Creature
-from mjxgait.physics import heavier_model
 from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant

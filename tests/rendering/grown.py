@@ -6,7 +6,7 @@ import numpy as np
 
 from mjxgait.champion import Champion
 from mjxgait.config.layers import find_creature
-from mjxgait.controllers.key_poses.config import DriveConfig
+from mjxgait.controllers.config import DriveConfig
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.creature import load_creature
 from mjxgait.reference.outcome import blank_film

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers import small_config
 
-from mjxgait.controllers.key_poses.config import HOLDS
+from mjxgait.controllers.config import HOLDS
 from mjxgait.creature import Creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.state import EvolutionState

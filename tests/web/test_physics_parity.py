@@ -19,8 +19,9 @@ from web.brains import examined, with_a_brain
 from web.engine import engine_folder, node
 
 from mjxgait.config.layers import data_folder
+from mjxgait.controllers.config import DriveConfig
 from mjxgait.controllers.expressions.written import written_champion
-from mjxgait.controllers.key_poses.config import DriveConfig, PoseConfig
+from mjxgait.controllers.key_poses.config import PoseConfig
 from mjxgait.creature import load_creature
 from mjxgait.creature.anatomy import Stepping
 from mjxgait.plugins import resolve_config

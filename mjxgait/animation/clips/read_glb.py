@@ -256,5 +256,5 @@ def _skins(document: Document, number: int, world: np.ndarray) -> Mapping[int, n
         spots = np.concatenate([places.astype(float), np.ones((len(places), 1))], 1)
         points.append((bound[main] @ spots[..., None])[:, :3, 0])
         followed.append(joints[main])
-    every_point, who = np.concatenate(points), np.concatenate(followed)
-    return {int(joint): every_point[who == joint] for joint in joints}
+    every_point, leader = np.concatenate(points), np.concatenate(followed)
+    return {int(joint): every_point[leader == joint] for joint in joints}

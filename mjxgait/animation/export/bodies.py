@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
-from mjxgait.animation.export.gltf import Buffer, add_tiles
+from mjxgait.animation.export.floor import add_tiles
+from mjxgait.animation.export.gltf import Buffer
 from mjxgait.animation.export.scenery import add_still_water
 from mjxgait.animation.export.shaped import material_of, shaped
 from mjxgait.animation.export.skeleton import gltf_axes, quaternions

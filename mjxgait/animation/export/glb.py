@@ -14,8 +14,9 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.clips.clip import NOTE
+from mjxgait.animation.export.floor import add_tiles
 from mjxgait.animation.export.footfalls import contacts
-from mjxgait.animation.export.gltf import Buffer, add_channel, add_tiles, facts_of
+from mjxgait.animation.export.gltf import Buffer, add_channel, facts_of
 from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.scenery import add_scenery
 from mjxgait.animation.export.shaped import material_of, shaped
@@ -24,9 +25,9 @@ from mjxgait.animation.export.skeleton import (
     Skeleton,
     gltf_axes,
     local_poses,
+    moved,
     resting,
     skeleton_of,
-    travel,
     world_poses,
 )
 from mjxgait.animation.export.surface import Piece, along_limbs, pieces_of
@@ -203,7 +204,7 @@ def _add_animations(
 ) -> None:
     """Add an animation for each loop; all have the joints that move in any of them."""
     rest = [(node.translation, node.rotation) for node in document.nodes]
-    tracks = {name: _tracks(loop, skeleton, axes, travelling) for name, loop in loops.items()}
+    tracks = {name: moved(loop, skeleton, axes, travelling) for name, loop in loops.items()}
     moving = [
         (b, i)
         for b, still in enumerate(rest)
@@ -217,20 +218,3 @@ def _add_animations(
             path = ("translation", "rotation")[i]
             add_channel(buffer, animation, times, b, path, tracks[name][i][:, b])
         document.animations.append(animation)
-
-
-def _tracks(
-    loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and quaternions of the joints; see `local_poses`.
-
-    A loop with a path follows it. Otherwise, if travelling, the root moves on evenly, in a circle
-    if the walk turns.
-    """
-    pos, quat = local_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
-    if loop.path is not None:
-        pos[:, 0] = np.pad(loop.path, ((0, 0), (0, 1))) @ axes.T
-    elif travelling:
-        pos[:, 0], turned = travel(loop)
-        quat[:, 0, 1], quat[:, 0, 3] = np.sin(turned / 2), np.cos(turned / 2)
-    return pos, quat

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
-from mjxgait.animation.export.gltf import JUMP, Buffer, add_channel, add_floor
+from mjxgait.animation.export.floor import JUMP, add_floor
+from mjxgait.animation.export.gltf import Buffer, add_channel
 from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.shaped import material_of, shaped
 from mjxgait.animation.export.skeleton import gltf_axes

@@ -87,6 +87,23 @@ def world_poses(
     return np.array(pos), np.array(rot)
 
 
+def moved(
+    loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and quaternions of the joints in each frame; see `local_poses`.
+
+    A loop with a path follows it. Otherwise, if travelling, the root moves on evenly, in a circle
+    if the walk turns.
+    """
+    pos, quat = local_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
+    if loop.path is not None:
+        pos[:, 0] = np.pad(loop.path, ((0, 0), (0, 1))) @ axes.T
+    elif travelling:
+        pos[:, 0], turned = _travel(loop)
+        quat[:, 0, 1], quat[:, 0, 3] = np.sin(turned / 2), np.cos(turned / 2)
+    return pos, quat
+
+
 def walked(
     loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -97,7 +114,7 @@ def walked(
     pos, rot = world_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
     if not travelling:
         return pos, rot
-    gone, heading = travel(loop)
+    gone, heading = _travel(loop)
     about = Rotation.from_euler("y", heading[:, None]).as_matrix()[:, None]
     return (about @ pos[..., None])[..., 0] + gone[:, None], about @ rot
 
@@ -111,7 +128,7 @@ def resting(loop: WalkLoop) -> np.ndarray:
     return qpos
 
 
-def travel(loop: WalkLoop) -> tuple[np.ndarray, np.ndarray]:
+def _travel(loop: WalkLoop) -> tuple[np.ndarray, np.ndarray]:
     """Even motion of the root: [F, 3] m, and [F] rad to the left; a circle if the walk turns."""
     share = np.linspace(0, 1, len(loop.qpos))
     turned = share * loop.turned

@@ -13,10 +13,9 @@ from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.skeleton import (
     Skeleton,
     gltf_axes,
-    local_poses,
+    moved,
     resting,
     skeleton_of,
-    travel,
     world_poses,
 )
 from mjxgait.animation.export.surface import Piece, along_limbs, linear, pieces_of
@@ -83,10 +82,7 @@ def _add_skeleton(
     motion.CreateJointsAttr(paths)
     motion.CreateScalesAttr(Vt.Vec3hArray(len(paths), (1, 1, 1)))
     places, turns = motion.CreateTranslationsAttr(), motion.CreateRotationsAttr()
-    pos, quat = local_poses(model, skeleton, loop.qpos, axes)
-    if travelling:
-        pos[:, 0], turned = travel(loop)
-        quat[:, 0, 1], quat[:, 0, 3] = np.sin(turned / 2), np.cos(turned / 2)
+    pos, quat = moved(loop, skeleton, axes, travelling)
     for frame in range(len(pos)):
         places.Set(Vt.Vec3fArray.FromNumpy(pos[frame].astype(np.float32)), frame)
         turns.Set(Vt.QuatfArray.FromNumpy(quat[frame].astype(np.float32)), frame)

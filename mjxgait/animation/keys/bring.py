@@ -63,8 +63,8 @@ def bring(
     try:
         return _bring(creature, path, table, ends, tolerance, way, tell)
     except UserError as error:
-        told = str(error)
-        raise UserError(told if str(path) in told else f"{path}: {told}") from None
+        message = str(error)
+        raise UserError(message if str(path) in message else f"{path}: {message}") from None
 
 
 def _bring(
@@ -83,7 +83,7 @@ def _bring(
     read = READERS[kind](path)
     wanted = list(creature.joints.names) if isinstance(read, AngleTrack) else movers(creature)
     names = matched(wanted, read.names, table, "the table of names")
-    for line in told_names(names, wanted, read.names):
+    for line in name_lines(names, wanted, read.names):
         tell(line)
     read = _cut(read, ends)
     track = (
@@ -91,13 +91,15 @@ def _bring(
         if isinstance(read, AngleTrack)
         else retarget(creature, read, names, axes_of(creature, read, names, way))
     )
-    for line in told_errors(track):
+    for line in error_lines(track):
         tell(line)
     cycle = find_cycle(creature, read.times, track.angles, *ends)
     own = own_poses(creature, read.note, cycle) if isinstance(read, Clip) and read.note else None
     cycle = own.cycle if own else cycle
     fit = own.fit if own else fit_poses(creature, cycle, tolerance)
-    for line in told_cycle(cycle) + (told_own(own) if own else told_fit(fit)) + told_clipped(fit):
+    for line in (
+        cycle_lines(cycle) + (own_lines(own) if own else fit_lines(fit)) + clipped_lines(fit)
+    ):
         tell(line)
     return Brought(names, read.times, track, cycle, fit, own)
 
@@ -139,7 +141,7 @@ def _angles(creature: Creature, read: AngleTrack, names: Mapping[str, str]) -> R
     return Retargeted(angles, errors)
 
 
-def told_names(names: Mapping[str, str], wanted: list[str], found: tuple[str, ...]) -> list[str]:
+def name_lines(names: Mapping[str, str], wanted: list[str], found: tuple[str, ...]) -> list[str]:
     """Report lines: the matched names."""
     lines = [f"names: {len(names)} of {len(wanted)} parts have a bone or a column"]
     lines += [f"  {own} <- {other}" for own, other in names.items()]
@@ -150,7 +152,7 @@ def told_names(names: Mapping[str, str], wanted: list[str], found: tuple[str, ..
     return lines
 
 
-def told_errors(track: Retargeted) -> list[str]:
+def error_lines(track: Retargeted) -> list[str]:
     """Report lines: how well the joints can follow the file."""
     lines = ["what the joints cannot do, in degrees (root mean square, most):"]
     for name, missed in track.errors.items():
@@ -159,7 +161,7 @@ def told_errors(track: Retargeted) -> list[str]:
     return lines
 
 
-def told_cycle(cycle: Cycle) -> list[str]:
+def cycle_lines(cycle: Cycle) -> list[str]:
     """Report line: the cycle that was found."""
     mirrored = "its second half mirrors the first" if cycle.mirrored else "not mirrored"
     return [
@@ -168,13 +170,13 @@ def told_cycle(cycle: Cycle) -> list[str]:
     ]
 
 
-def told_fit(fit: Fit) -> list[str]:
+def fit_lines(fit: Fit) -> list[str]:
     """Report line: the fit of the cycle."""
     error = np.degrees(fit.error)
     return [f"key poses: {len(fit.key_poses)}, {error:.1f} degrees from it (root mean square)"]
 
 
-def told_own(own: Own) -> list[str]:
+def own_lines(own: Own) -> list[str]:
     """Report line: the changes to an exported walk."""
     count, changed = len(own.fit.key_poses), np.degrees(own.changed)
     return [
@@ -183,7 +185,7 @@ def told_own(own: Own) -> list[str]:
     ]
 
 
-def told_clipped(fit: Fit) -> list[str]:
+def clipped_lines(fit: Fit) -> list[str]:
     """Report lines: one for each joint with angles cut off at its pose range."""
     return [
         f"  {name}: up to {lost:.0f} degrees beyond its pose range are cut off"

@@ -210,14 +210,14 @@ def departure(original: Original, walk: Walk) -> Departure:
 
 def _in_words(pitch: float, period: float) -> list[str]:
     """Sentences on the trunk's mean pitch in rad, nose down, and the share of the drawn period."""
-    told = []
+    sentences = []
     if abs(pitch) > TILTED:
         way = "down" if pitch > 0 else "up"
-        told.append(f"the trunk is tilted nose {way} by {np.degrees(abs(pitch)):.0f} degrees")
+        sentences.append(f"the trunk is tilted nose {way} by {np.degrees(abs(pitch)):.0f} degrees")
     if abs(period - 1.0) > OUT_OF_TIME:
         way = "longer" if period > 1.0 else "shorter"
-        told.append(f"a cycle takes {abs(period - 1.0):.0%} {way}")
-    return told
+        sentences.append(f"a cycle takes {abs(period - 1.0):.0%} {way}")
+    return sentences
 
 
 def _over_stride(walk: Walk, first: int, last: int, count: int) -> np.ndarray:
@@ -230,7 +230,7 @@ def _over_stride(walk: Walk, first: int, last: int, count: int) -> np.ndarray:
 def _feet_in_words(creature: Creature, drawn: np.ndarray, done: np.ndarray) -> list[str]:
     """Sentences on the feet's changes, seen from the trunk; the largest first."""
     before, after = _feet(creature, drawn), _feet(creature, done)
-    told = []
+    changes = []
     for foot, name in enumerate(creature.feet.names):
         was, now = before[:, foot], after[:, foot]
         outward = np.sign(was[:, 1].mean()) or 1.0
@@ -242,9 +242,9 @@ def _feet_in_words(creature: Creature, drawn: np.ndarray, done: np.ndarray) -> l
         ):
             verb = more.split()[0]
             how = more if change > 0 else f"{verb} {{}} {less}"
-            told.append((abs(change), f"{name} " + how.format(f"{100 * abs(change):.0f} cm")))
-    told = sorted((t for t in told if t[0] > WORTH_TELLING), reverse=True)
-    return [sentence for _, sentence in told[:MOST_LINES]]
+            changes.append((abs(change), f"{name} " + how.format(f"{100 * abs(change):.0f} cm")))
+    changes = sorted((one for one in changes if one[0] > WORTH_TELLING), reverse=True)
+    return [sentence for _, sentence in changes[:MOST_LINES]]
 
 
 def _feet(creature: Creature, angles: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from mjxgait.config.tables import (
     NonNegative,
     Positive,
 )
-from mjxgait.controllers.key_poses.config import holds
+from mjxgait.controllers.config import holds
 
 FUNCTIONS = {
     "+": 2,

@@ -13,7 +13,7 @@ import numpy as np
 from mjxgait.controllers.expressions.config import ProgramConfig
 from mjxgait.controllers.expressions.text import ARITY, CONSTANT, EMPTY, FIRST_ADDED, FUNCTION_CODES
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import pytree
+from mjxgait.types import choose, pytree
 
 
 @pytree
@@ -137,7 +137,7 @@ def _next_node(
     after = Growing(
         jnp.where(fresh, here + 1, state.pending), state.open - 1 + given, state.used + 1
     )
-    after = jax.tree.map(partial(jnp.where, alive), after, state)
+    after = choose(alive, after, state)
     return after, (jnp.where(alive, code, EMPTY), jnp.where(alive, value, 0.0))
 
 

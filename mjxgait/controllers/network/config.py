@@ -7,7 +7,7 @@ from typing import Annotated
 import pydantic
 
 from mjxgait.config.tables import SHAPE, STRICT, Positive
-from mjxgait.controllers.key_poses.config import holds
+from mjxgait.controllers.config import holds
 
 JOINTS = ("joint_pos", "joint_vel")
 """Observations of every joint."""

@@ -104,11 +104,6 @@ def first_neuron(links: int) -> int:
     return 2 + links + links + 3 * links
 
 
-def value_count(parts: int, links: int, room: NerveRoom) -> int:
-    """Return V."""
-    return first_neuron(links) + parts * room.local + room.central
-
-
 def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
     """Return the wiring of a body. Wires from missing parts carry nothing."""
     parts, exists = body.parts, body.parts.exists

@@ -19,7 +19,7 @@ from mjxgait.controllers.sims_brain.phenotype import body_of
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.creature.body import Body
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Tree
+from mjxgait.types import Tree, choose
 
 LIGHT = "light"
 
@@ -37,7 +37,6 @@ class Brains:
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
-    grows: ClassVar[bool] = True
 
     @classmethod
     def with_settings(
@@ -124,7 +123,7 @@ def _restricted(evolves: str | Choice, child: Genotype, mother: Genotype) -> Gen
     """Return the child with the mother's genes wherever they may not evolve."""
 
     def of_mother(fixed: jax.Array, own: Tree, other: Tree) -> Tree:
-        return jax.tree.map(lambda a, b: jnp.where(fixed, b, a), own, other)
+        return choose(fixed, other, own)
 
     steering_only = chosen(evolves, "steering")
     fixed = steering_only | chosen(evolves, "brain")

@@ -23,7 +23,7 @@ LEAST = 2.0**-24
 """Half of the smallest positive number that is drawn."""
 
 
-def numbers(key: jax.Array, shapes: Mapping[Name, tuple[int, ...]]) -> dict[Name, jax.Array]:
+def uniforms(key: jax.Array, shapes: Mapping[Name, tuple[int, ...]]) -> dict[Name, jax.Array]:
     """Draw uniform numbers in [0, 1), by name, in these shapes."""
     ends = np.cumsum([math.prod(shape) for shape in shapes.values()])
     parts = jnp.split(jax.random.uniform(key, (int(ends[-1]),)), ends[:-1])
@@ -74,8 +74,8 @@ class Graph:
     """Genotype of a body. Growth begins at node 0.
 
     Nodes: half [N, 3] m, half sizes of a block; joint [N], to the parent, an index into
-    `reference_body.material.JOINTS`; swing [N, 3] rad, range of each hinge to either side;
-    recursion [N], how often a node may recur on one branch.
+    `reference_body.JOINTS`; swing [N, 3] rad, range of each hinge to either side; recursion [N],
+    how often a node may recur on one branch.
     Connections, [N, C]: target, a node; used; place [N, C, 3], a direction from the parent block's
     middle, in its half sizes, that leaves the block at the child's joint; turn [N, C, 3] rad about
     the joint's outward axis and the two others; scale; mirror, 0 unchanged, 1 mirrored, 2 both;
@@ -103,7 +103,7 @@ def random_graph(key: jax.Array, capacity: Capacity, ranges: Ranges) -> Graph:
     """
     nodes, connections = capacity.nodes, capacity.connections
     each = (nodes, connections)
-    drawn = numbers(
+    drawn = uniforms(
         key,
         {
             "half": (nodes, 3),
@@ -195,7 +195,7 @@ def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
     """Draw random neurons: any function, any source; weights are normal."""
     effects = {"effect_source": (nodes, 3), "effect_weight": (nodes, 3)}
     steer = {"steer": (nodes, 3, 2, 3)} if room.steer else {}
-    drawn = numbers(key, _shapes((nodes, room.local)) | effects | steer)
+    drawn = uniforms(key, _shapes((nodes, room.local)) | effects | steer)
     source = numbered(drawn["effect_source"], room.codes)
     return Nerves(
         **_neurons(drawn, room),
@@ -207,7 +207,7 @@ def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
 
 def random_centre(key: jax.Array, room: NerveRoom) -> Centre:
     """Draw random central neurons, as `random_nerves` does."""
-    return Centre(**_neurons(numbers(key, _shapes((room.central,))), room))
+    return Centre(**_neurons(uniforms(key, _shapes((room.central,))), room))
 
 
 def _favoured(uniform: jax.Array, share: float, one: int, count: int) -> jax.Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
 from mjxgait.controllers.sims_brain.reference_body import AXES, LARGEST, ROOM, SMALLEST
-from mjxgait.types import pytree
+from mjxgait.types import choose, pytree
 
 
 @pytree
@@ -25,8 +25,8 @@ class Boxes:
 def inside(one: Boxes, others: Boxes) -> jax.Array:
     """Return the overlap depth [P] of one block with each other, over the smaller one's size.
 
-    Negative if one of their six normals separates them (`physics.batched_trees.overlap`). A size is
-    the cube root of a volume.
+    Negative if one of their six normals separates them (`dynamics.deepest`). A size is the cube root of
+    a volume.
     """
     apart = others.middle - one.middle
     reach = jnp.abs(others.axes @ one.axes.T)  # [P, other's axis, own axis]
@@ -97,7 +97,7 @@ def grown(graph: Graph, capacity: Capacity) -> Parts:
             wanted = grows & ((mirror == image) | (mirror == 2))
             growing, fits = _with_part(graph, growing, part, place, image, wanted)
             room = room & fits
-        return jax.tree.map(lambda a, b: jnp.where(room, a, b), growing, before)
+        return choose(room, growing, before)
 
     growing = jax.lax.fori_loop(0, capacity.parts * connections, step, _seed(graph, capacity))
     return growing.parts

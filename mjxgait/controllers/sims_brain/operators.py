@@ -20,12 +20,12 @@ from mjxgait.controllers.sims_brain.genotype import (
     Ranges,
     normal,
     numbered,
-    numbers,
     random_centre,
     random_graph,
     random_nerves,
+    uniforms,
 )
-from mjxgait.types import pytree
+from mjxgait.types import choose, pytree
 
 
 @pytree
@@ -115,7 +115,7 @@ class Kin:
             used=graph.used.at[at].set(True),
         )
         grafted = dataclasses.replace(hung, graph=joined)
-        return jax.tree.map(lambda a, b: jnp.where(free.any(), a, b), grafted, mother)
+        return choose(free.any(), grafted, mother)
 
     def _strength(self, key: jax.Array) -> jax.Array:
         """Draw the factor [] of one mutation."""
@@ -135,7 +135,7 @@ class Kin:
         size = jnp.sum(alive) * sum(leaf[0].size for leaf in of_nodes)
         chance = strength * self.rates.value / size
         places = range(len(leaves))
-        drawn = numbers(
+        drawn = uniforms(
             key, {(use, i): leaves[i].shape for i in places for use in ("which", "how")}
         )
         bounds = self._bounds(shape)
@@ -190,7 +190,7 @@ def _with_new_node(
     """Draw an unconnected node anew, and connect it."""
     alive = reachable(genotype.graph)
     nodes, connections = genotype.graph.target.shape
-    drawn = numbers(key, {"happens": (), "node": (nodes,), "slot": (nodes, connections)})
+    drawn = uniforms(key, {"happens": (), "node": (nodes,), "slot": (nodes, connections)})
     free = jnp.argmax(jnp.where(alive, -1.0, drawn["node"]))
     new = _chosen(jnp.arange(nodes) != free, genotype, other)
     # The new node has no connections of its own yet.
@@ -203,7 +203,7 @@ def _with_new_node(
     )
     new = dataclasses.replace(new, graph=graph)
     ok = (drawn["happens"] < chance) & ~alive.all() & spare.any()
-    return jax.tree.map(lambda a, b: jnp.where(ok, a, b), new, genotype)
+    return choose(ok, new, genotype)
 
 
 def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: jax.Array) -> Graph:
@@ -211,27 +211,22 @@ def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: jax.Array) 
     alive = reachable(graph)
     nodes, connections = graph.target.shape
     shapes = {"happens": (), "adds": (), "slot": (nodes, connections), "target": (nodes,)}
-    drawn = numbers(key, shapes)
+    drawn = uniforms(key, shapes)
     adds = drawn["adds"] < 0.5
     open_slots = alive[:, None] & jnp.where(adds, ~graph.used, graph.used)
     chosen = _one_of(drawn["slot"], open_slots)
     here = jnp.zeros((nodes, connections), bool).at[chosen].set(drawn["happens"] < chance)
     here = here & open_slots
     node = jnp.argmax(jnp.where(alive, drawn["target"], -1.0))
-    names = ("place", "turn", "scale", "mirror", "terminal")
-    fresh = {
-        name: jnp.where(
-            here.reshape(*here.shape, *[1] * (getattr(graph, name).ndim - 2)) & adds,
-            getattr(other, name),
-            getattr(graph, name),
-        )
-        for name in names
-    }
+    fresh, known = (
+        {name: getattr(one, name) for name in ("place", "turn", "scale", "mirror", "terminal")}
+        for one in (other, graph)
+    )
     return dataclasses.replace(
         graph,
         used=jnp.where(here, adds, graph.used),
         target=jnp.where(here & adds, node, graph.target),
-        **fresh,
+        **choose(here & adds, fresh, known),
     )
 
 
@@ -253,9 +248,5 @@ def _without_used(genotype: Genotype) -> Genotype:
 
 def _chosen(first: jax.Array, one: Genotype, other: Genotype) -> Genotype:
     """Take nodes [N] from `one` where `first`, else from `other`; central neurons from `one`."""
-
-    def pick(a: jax.Array, b: jax.Array) -> jax.Array:
-        return jnp.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b)
-
-    graph, nerves = jax.tree.map(pick, (one.graph, one.nerves), (other.graph, other.nerves))
+    graph, nerves = choose(first, (one.graph, one.nerves), (other.graph, other.nerves))
     return Genotype(graph, nerves, one.centre)

@@ -132,8 +132,8 @@ def _cycle(champion: Champion, creature: Creature) -> np.ndarray:
 def _between(one: Wish, other: Wish) -> dict[str, object]:
     turn = (one.get("turn", 0.0) + other.get("turn", 0.0)) / 2
     speed = (one["speed"] + other["speed"]) / 2
-    told = {name: value for name, value in one.items() if name not in ("turn", "steer")}
-    return {**told, "speed": speed} | ({"turn": turn} if turn else {})
+    others = {name: value for name, value in one.items() if name not in ("turn", "steer")}
+    return {**others, "speed": speed} | ({"turn": turn} if turn else {})
 
 
 MOMENTS, SECONDS = 8, 1.0
@@ -185,7 +185,7 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
     step = float(creature.model.opt.timestep)
     moments = WARMUP + np.arange(MOMENTS) / MOMENTS
     steps = round((moments[-1] + SECONDS + SETTLES + WATCHED) / step)
-    told = commanded_headings(before, after, moments, steps, step)
+    commanded = commanded_headings(before, after, moments, steps, step)
     reference = ChangingReference(creature, before, after, step, moments, SECONDS)
     outcome = simulate(
         creature,
@@ -193,11 +193,11 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
         nominal_starts(creature, MOMENTS),
         steps * step,
         record=MOMENTS,
-        heading=told,
+        heading=commanded,
         threads=1,
         reference=reference,
     )
-    return outcome.stayed_up & _as_told(creature, outcome, float(after.wish["speed"]))
+    return outcome.stayed_up & _as_commanded(creature, outcome, float(after.wish["speed"]))
 
 
 def commanded_headings(
@@ -212,7 +212,7 @@ def commanded_headings(
     return np.cumsum(turns, axis=1) - turns[:, :1]
 
 
-def _as_told(creature: Creature, outcome: Outcome, speed: float) -> np.ndarray:
+def _as_commanded(creature: Creature, outcome: Outcome, speed: float) -> np.ndarray:
     """Return [S] for the last seconds: speed by chords of a second, and the mean heading."""
     limits, film = CertificateConfig().wishes, outcome.trajectory
     watched, second = round(WATCHED / film.time_step), round(1.0 / film.time_step)

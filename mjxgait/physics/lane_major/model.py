@@ -45,9 +45,9 @@ def check_supported(model: mujoco.MjModel) -> list[tuple[int, int]]:
 def _refuse(when: ArrayLike, reason: str, names: Sequence[str] = ()) -> None:
     """Raise if `when` [n] holds anywhere, and list the names of the elements for which it holds."""
     if np.any(when):
-        told = [name for name, guilty in zip(names, np.ravel(when), strict=False) if guilty]
-        some = ", ".join(told[:3]) + (f" and {len(told) - 3} more" if len(told) > 3 else "")
-        raise UnsupportedModel(f"{reason}: {some}" if told else reason)
+        found = [name for name, guilty in zip(names, np.ravel(when), strict=False) if guilty]
+        some = ", ".join(found[:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
+        raise UnsupportedModel(f"{reason}: {some}" if found else reason)
 
 
 def _check_options(model: mujoco.MjModel) -> None:
@@ -204,7 +204,7 @@ def softened(
 ) -> Softened:
     """Convert the parameters as MuJoCo's engine does.
 
-    Computation docs, "Parameters"; MJX `constraint._kbi`.
+    Computation docs, "Parameters"; `mujoco.mjx._src.constraint._kbi`.
     """
     time, ratio = (float(x) for x in solref)
     low, high, width, mid, power = (float(x) for x in solimp)

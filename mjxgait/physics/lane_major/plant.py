@@ -97,22 +97,22 @@ class FastPlant:
     def parameters_of(
         self, model: mujoco.MjModel, layout: ObservationLayout, crossings: Crossings | None = None
     ) -> Parameters:
-        """See `Plant.parameters_of`."""
+        """See `ModelPlant.parameters_of`."""
         try:
             other = fast_plant(model, layout, crossings, padded=self.topology.open_pairs)
-            told = difference(self.topology, other.topology)
-        except UnsupportedModel as reason:
-            told = f"the fast physics does not know this: {reason}"
-        if told:
-            raise OtherTopology(told)
+            reason = difference(self.topology, other.topology)
+        except UnsupportedModel as error:
+            reason = f"the fast physics does not know this: {error}"
+        if reason:
+            raise OtherTopology(reason)
         return other.parameters
 
     def with_parameters(self, parameters: Parameters) -> Self:
-        """See `Plant.with_parameters`."""
+        """See `ModelPlant.with_parameters`."""
         return dataclasses.replace(self, parameters=parameters)
 
     def with_mass_scale(self, parameters: Parameters, factor: Number) -> Parameters:
-        """See `Plant.with_mass_scale`."""
+        """See `ModelPlant.with_mass_scale`."""
         factor = self._of_moving(factor)
         heavy = dataclasses.replace(
             parameters,
@@ -122,7 +122,7 @@ class FastPlant:
         return self._reweighed(parameters, heavy)
 
     def with_length_scale(self, parameters: Parameters, factor: Number) -> Parameters:
-        """See `Plant.with_length_scale`."""
+        """See `ModelPlant.with_length_scale`."""
         large = with_length_scale(self.topology, parameters, self._of_moving(factor))
         return self._reweighed(parameters, large)
 

@@ -250,7 +250,7 @@ def missed(
 def likeness(creature: Body, step: float, horizon: int, stats: TargetStats) -> dict[str, jax.Array]:
     """Compare a walk with an animal's: each measure [] in the unit of its target.
 
-    Certification measures the same (`certification.likeness`).
+    Certification measures the same (`describe.likeness`).
     """
     lived, hip = jnp.maximum(stats.steps, 1), creature.frame.hip_height
     speed = jnp.maximum(steady_speed(step, horizon, stats), SLOW)

@@ -12,7 +12,7 @@ from helpers import small_config
 from rich.console import Console
 
 from mjxgait.champion import Champion, read_champion, write_champion
-from mjxgait.controllers.key_poses.config import DriveConfig
+from mjxgait.controllers.config import DriveConfig
 from mjxgait.controllers.network.config import MIRRORED, READS, NetworkConfig
 from mjxgait.controllers.network.controller import Network, split
 from mjxgait.controllers.network.reference import NetworkReference

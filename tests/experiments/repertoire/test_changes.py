@@ -108,7 +108,7 @@ def test_a_change_that_ends_in_a_fall_fails(stool: Creature, monkeypatch: pytest
     """Even at the new speed and heading."""
     before = walking_at(stool, treading(stool, LARGE))
     fallen = dataclasses.replace(falling(stool), wish=before.wish)
-    monkeypatch.setattr(neighbours, "_as_told", lambda *_: np.ones(MOMENTS, bool))
+    monkeypatch.setattr(neighbours, "_as_commanded", lambda *_: np.ones(MOMENTS, bool))
     assert succeeds(stool, before, before).all()
     assert not succeeds(stool, before, fallen).any()
 
