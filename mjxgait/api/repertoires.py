@@ -20,13 +20,14 @@ from mjxgait.files import replaced, write_text
 from mjxgait.output import Output
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import WalkTargets, speed_of, with_targets
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     check_parts,
     create_run,
     is_taken,
     open_run,
 )
-from mjxgait.training.stored import disk_errors, locked
+from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
     from mjxgait.animation.export import Character

@@ -25,7 +25,7 @@ from mjxgait.errors import UserError
 from mjxgait.files import write_text, writing
 from mjxgait.output import Output
 from mjxgait.training.folder import CREATURE, is_taken
-from mjxgait.training.stored import locked
+from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
     from mjxgait.experiments.ablation.plan import Plan, Study

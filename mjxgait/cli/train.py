@@ -27,6 +27,7 @@ from mjxgait.tasks.walk.targets import (
     configured,
     hint,
 )
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     METRICS,
     PLOT,
@@ -37,7 +38,6 @@ from mjxgait.training.folder import (
     open_run,
     read_metrics,
 )
-from mjxgait.training.stored import disk_errors
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.training.screen import Screen

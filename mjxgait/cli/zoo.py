@@ -9,8 +9,9 @@ from mjxgait.errors import INTERRUPTED
 from mjxgait.experiments.multi_seed import read_seeds
 from mjxgait.files import replaced
 from mjxgait.output import Output
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import Line, command, open_run
-from mjxgait.training.stored import disk_errors, locked
+from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
     from mjxgait.distributed.jobs import Advanced

@@ -16,6 +16,7 @@ from mjxgait.errors import UserError
 from mjxgait.files import write_text
 from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.video import champion_of
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
@@ -24,7 +25,6 @@ from mjxgait.training.folder import (
     is_taken,
     new_run_folder,
 )
-from mjxgait.training.stored import disk_errors
 
 ZOO = "zoo.toml"
 

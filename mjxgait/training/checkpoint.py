@@ -19,6 +19,7 @@ import orbax.checkpoint as ocp
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import check_generator, key_from
 from mjxgait.evolution.state import EvolutionState
+from mjxgait.training.disk import disk_errors, try_room
 from mjxgait.training.stored import (
     FOLDER,
     MANIFEST,
@@ -26,10 +27,8 @@ from mjxgait.training.stored import (
     STATE,
     Manifest,
     array_hash,
-    disk_errors,
     read_stored,
     stored_generations,
-    try_room,
 )
 from mjxgait.types import by_name
 

@@ -36,7 +36,7 @@ from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, read_text, write_te
 from mjxgait.plugins import build_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.user_code import KINDS, places_of
-from mjxgait.training.stored import disk_errors
+from mjxgait.training.disk import disk_errors
 
 CONFIG, OWN = "config.toml", "own.toml"
 """Files in a run folder: settings; and FILE.py:CLASS of a user-defined controller or task."""

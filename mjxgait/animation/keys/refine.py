@@ -26,8 +26,8 @@ from mjxgait.rendering.filmstrip import Kept, draw_front, front_shape
 from mjxgait.rendering.video import LOOP_SECONDS, champion_of
 from mjxgait.rendering.walk import Walk
 from mjxgait.tasks.walk.textbook_start import ORDERED
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import CERTIFICATE, create_run, is_taken, open_run
-from mjxgait.training.stored import disk_errors
 
 KEYS = "keys.json"
 """File in the run folder with the cycle that the run stays near."""
