@@ -21,12 +21,7 @@ from mjxgait.output import Output
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import WalkTargets, speed_of, with_targets
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import (
-    check_parts,
-    create_run,
-    is_taken,
-    open_run,
-)
+from mjxgait.training.folder import check_free, check_parts, create_run, open_run
 from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
@@ -222,11 +217,7 @@ def planned(
     check_parts(creature, base)
     _character(options.onto, creature)
     folder = options.out or Path("runs") / f"repertoire-{creature.name}"
-    if is_taken(folder):
-        raise UserError(
-            f"{folder}: holds something already; name another folder with --out, or go on with "
-            f"--resume {folder}"
-        )
+    check_free(folder)
     # Last, for it draws many poses.
     configs = {cell: settings_of(cell, grid, creature, base) for cell in grid.cells}
     return Planned(folder, creature, grid, configs)

@@ -24,7 +24,7 @@ from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
 from mjxgait.files import write_text, writing
 from mjxgait.output import Output
-from mjxgait.training.folder import CREATURE, is_taken
+from mjxgait.training.folder import CREATURE, check_free, write_creature
 from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ def finished(planned: Prepared, options: AblateRequest, output: Output) -> Path 
     folder, creature, plan = planned.folder, planned.creature, planned.plan
     screen, begin = _Progress(output), None
     if not options.resume:
-        _check_new(folder)
+        check_free(folder)
         for runs in planned.parts:
             check_spec(creature, runs[0].config)
         begin = partial(_create, folder, planned.study, creature)
@@ -299,21 +299,10 @@ class _Progress:
         self.output.say(f"{number} of {count} champions examined in C MuJoCo")
 
 
-def _check_new(folder: Path) -> None:
-    """Refuse a folder that is not empty."""
-    if is_taken(folder):
-        raise UserError(
-            f"{folder}: holds something already; name another folder with --out, or go on with "
-            f"--resume {folder}"
-        )
-
-
 def _create(folder: Path, study: "Study", creature: Creature) -> None:
     """Make the folder of a study, with its exact settings and creature."""
     with writing(folder):
-        (folder / CREATURE).mkdir(parents=True, exist_ok=True)
-        for name, text in creature.files.items():
-            write_text(folder / CREATURE / name, text)
+        write_creature(folder / CREATURE, creature.files)
         write_text(folder / STUDY, dump_toml(study))
 
 

@@ -20,9 +20,9 @@ from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
+    check_free,
     check_parts,
     create_run,
-    is_taken,
     new_run_folder,
 )
 
@@ -82,11 +82,7 @@ def check_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -
         )
     check_parts(creature, config)
     zoo = zoo or new_run_folder(f"{creature.name}-zoo", config.seed)
-    if is_taken(zoo):
-        raise UserError(
-            f"{zoo}: holds something already; name another folder with --out, or go on with "
-            f"--resume {zoo}"
-        )
+    check_free(zoo)
     return zoo
 
 

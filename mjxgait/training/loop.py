@@ -32,10 +32,10 @@ from mjxgait.training.folder import (
     METRICS,
     STRESS,
     append_lines,
-    keep_body,
     kept_champion,
     read_metrics,
     truncate_metrics,
+    write_creature,
 )
 from mjxgait.training.initial import (
     Genomes,
@@ -184,7 +184,7 @@ def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examine
         write_champion(examined.champion, creature, folder / CHAMPION)
         body = examined.champion.embodied(creature)
         if body.digest != creature.digest:
-            keep_body(folder / BODY, body)
+            write_creature(folder / BODY, body.files)
         write_text(folder / CERTIFICATE, examined.certificate.to_json())
         if examined.beyond:
             text = json.dumps(examined.beyond.document(), indent=2) + "\n"

@@ -27,7 +27,7 @@ from mjxgait.rendering.video import LOOP_SECONDS, champion_of
 from mjxgait.rendering.walk import Walk
 from mjxgait.tasks.walk.textbook_start import ORDERED
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import CERTIFICATE, create_run, is_taken, open_run
+from mjxgait.training.folder import CERTIFICATE, check_free, create_run, open_run
 
 KEYS = "keys.json"
 """File in the run folder with the cycle that the run stays near."""
@@ -290,11 +290,7 @@ def check_front(out: Path, keeps: Sequence[float]) -> None:
     Raises:
       UserError: the folder is not empty, or a share is there twice.
     """
-    if is_taken(out):
-        raise UserError(
-            f"{out}: holds something already; name another folder with --out, or go on with "
-            f"mjxgait refine --resume {out}"
-        )
+    check_free(out, "mjxgait refine --resume")
     if len(set(keeps)) < len(keeps):
         raise UserError("--keep: a share is there twice")
 
