@@ -23,7 +23,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
 from mjxgait.files import write_text, writing
-from mjxgait.output import Output
+from mjxgait.output import Output, duration
 from mjxgait.training.folder import CREATURE, check_free, write_creature
 from mjxgait.training.lock import locked
 
@@ -172,7 +172,7 @@ def prepared(options: AblateRequest) -> Prepared:
     words = (
         f"{len(plan.variants)} variants × {study.seeds} seeds = {len(plan.runs)} runs in "
         f"{len(parts)} program{'s' if len(parts) > 1 else ''}; at most "
-        f"{steps / 1e6:.0f} M creature-steps, about {_duration(3600 * hours)} at most on two cores"
+        f"{steps / 1e6:.0f} M creature-steps, about {duration(3600 * hours)} at most on two cores"
     )
     if hours > options.hours:
         raise UserError(
@@ -292,7 +292,7 @@ class _Progress:
         speed = news["steps"] / news["seconds"] / 1e6
         self.output.say(
             f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, "
-            f"{_duration(left)} left"
+            f"{duration(left)} left"
         )
 
     def measuring(self, number: int, count: int) -> None:
@@ -333,13 +333,3 @@ def _repeatable(options: AblateRequest) -> list[str]:
 
 def _hours(steps: int, programs: int) -> float:
     return (steps / EXPECTED_SPEED + 20 * programs) / 3600
-
-
-def _duration(seconds: float) -> str:
-    return (
-        f"{seconds / 3600:.1f} h"
-        if seconds > 5400
-        else f"{seconds / 60:.0f} min"
-        if seconds > 90
-        else f"{seconds:.0f} s"
-    )
