@@ -12,7 +12,7 @@ from rich.console import Console
 from mjxgait.api.make import load_creature
 from mjxgait.api.run import Place
 from mjxgait.config.schema import Config, Physics
-from mjxgait.config.tables import build, merge
+from mjxgait.config.tables import build, merge, not_none
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
@@ -273,10 +273,11 @@ def _settings(options: RepertoireRequest, creature: Creature) -> Config:
     """Return the settings that all walks share."""
     config = resolve_config(creature.settings.train, creature.name, Path(options.config))
     config = with_targets(config, creature, WalkTargets(gait=options.gait, style=options.style))
-    short = {"population": options.population, "generations": options.generations}
-    table: dict[str, object] = {"evolution": {k: v for k, v in short.items() if v is not None}}
-    table |= {} if options.seed is None else {"seed": options.seed}
-    table |= {} if options.physics is None else {"rollout": {"physics": options.physics}}
+    table = {
+        **not_none(seed=options.seed),
+        "evolution": not_none(population=options.population, generations=options.generations),
+        "rollout": not_none(physics=options.physics),
+    }
     return build(type(config), merge(dataclasses.asdict(config), table), "the options")
 
 

@@ -14,7 +14,7 @@ from mjxgait.cli.options import parsed
 from mjxgait.cli.train_options import TrainOptions, options_of, short_options
 from mjxgait.cli.zoo import evolve_zoo
 from mjxgait.config.schema import Config, ExaminationConfig
-from mjxgait.config.tables import build, merge
+from mjxgait.config.tables import build, merge, not_none
 from mjxgait.controllers.expressions.written import with_expressions
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import at_step, parse_scales
@@ -213,20 +213,15 @@ def _settings(options: TrainOptions) -> Config:
 
     The parser checks the types of options, not their ranges.
     """
-    short = {
-        "population": options.population,
-        "generations": options.generations,
-        "body": options.evolve_body,
-        "search": options.search,
-    }
     table = {
         "use": dataclasses.asdict(meant(options.settings.use)),
-        "evolution": {key: value for key, value in short.items() if value is not None},
-        "rollout": {
-            key: getattr(options, key)
-            for key in ("ground", "physics")
-            if getattr(options, key) is not None
-        },
+        "evolution": not_none(
+            population=options.population,
+            generations=options.generations,
+            body=options.evolve_body,
+            search=options.search,
+        ),
+        "rollout": not_none(ground=options.ground, physics=options.physics),
     }
     return build(
         type(options.settings), merge(dataclasses.asdict(options.settings), table), "the options"

@@ -15,7 +15,7 @@ from mjxgait.animation.keys.bring import Brought
 from mjxgait.animation.keys.cycle import interpolated
 from mjxgait.certification import criteria_of, read_certificate, verdict_of
 from mjxgait.config.schema import Config
-from mjxgait.config.tables import Table, build, merge
+from mjxgait.config.tables import Table, build, merge, not_none
 from mjxgait.controllers.key_poses.config import smooth
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -76,8 +76,7 @@ def base_settings(
     """
     ordered = merge(creature.settings.train, {"evolution": ORDERED})
     resolved = resolve_config(ordered, creature.name, config)
-    short = {"population": population, "generations": generations}
-    evolution = {key: value for key, value in short.items() if value is not None}
+    evolution = not_none(population=population, generations=generations)
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
     chosen = build(type(resolved), merge(table, others or {}), "the options")
     if chosen.use.controller != "poses":
