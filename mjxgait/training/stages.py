@@ -33,7 +33,7 @@ from mjxgait.training.generation import (
     promote,
     propose,
 )
-from mjxgait.training.spec import BodyParams, SimulatorSpec
+from mjxgait.training.simulator import BodyParams, SimulatorSpec
 from mjxgait.types import Evaluation, RequestedTrials, Tree
 
 
