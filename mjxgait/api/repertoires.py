@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Console
 
 from mjxgait.api.make import load_creature
+from mjxgait.api.progress import Progress, pace
 from mjxgait.api.run import Place
 from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import build, merge, not_none
@@ -330,26 +331,19 @@ def _leave(
         console.print(f"{count} clips: {files[0]}, their places: {files[1]}")
 
 
-class _Screen:
-    """Progress as plain lines."""
-
-    def __init__(self, output: Output) -> None:
-        self.output = output
+class _Screen(Progress):
+    """Progress of one row of walks after the other."""
 
     def evolved(self, name: str, generation: int, last: int, done: "Advanced | None") -> None:
         if done is None:
             self.output.say(f"{name}: compiling")
             return
-        left = (last - generation) * done.seconds / max(len(done.lines), 1)
         alive = [1 - line["failures"] / max(line["episodes"], 1) for line in done.lines[-1]]
         self.output.say(
             f"{name}: generation {generation} of {last}, {len(alive)} walks side by side, "
             f"{sum(alive) / len(alive):.0%} of their episodes without a fall, "
-            f"{done.steps / done.seconds / 1e6:.2f} M steps/s, {left:.0f} s left"
+            f"{pace(done, last - generation)}"
         )
-
-    def examined(self, count: int, of: int) -> None:
-        self.output.say(f"examined in C MuJoCo: {count} of {of}")
 
     def changed(self, count: int, of: int) -> None:
         self.output.say(f"from one walk to another, in C MuJoCo: {count} of {of}")
