@@ -1,4 +1,4 @@
-"""Error for a user's mistake, and helpers for its message."""
+"""Error for a user's mistake, and helpers for messages."""
 
 import difflib
 from collections.abc import Iterable, Sequence
@@ -40,3 +40,8 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     if near:
         return f'did you mean "{near[0]}"?'
     return f"known: {', '.join(names)}" if names else "none is known"
+
+
+def listed(names: Sequence[str], most: int = 6) -> str:
+    """Return `a, b, c` or `a, b, c and 7 more`."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -27,6 +27,13 @@ class Output:
         self.progress.print(text)
 
 
+def duration(seconds: float) -> str:
+    """Return a time in s, min or h, as text."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+
+
 def print_details() -> None:
     """Print the details of level DEBUG to the standard error, with the time of day."""
     handler = logging.StreamHandler()

@@ -30,7 +30,7 @@ from mjxgait.tasks.starts import Starts
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import signed_weights, terms_under
 from mjxgait.training.experiment import Batch
-from mjxgait.training.spec import SimulatorSpec
+from mjxgait.training.simulator import SimulatorSpec
 from mjxgait.types import Evaluation, RequestedTrials
 
 STOOL = Path(__file__).parent / "data" / "stool"

@@ -8,9 +8,10 @@ from mjxgait.api.run import Place
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.files import write_text, writing
+from mjxgait.files import writing
 from mjxgait.importer import TOML, WRITTEN, ImportChoices, Imported
 from mjxgait.importer import import_model as read_model
+from mjxgait.training.folder import write_creature
 
 
 def import_model(
@@ -97,6 +98,4 @@ def write_folder(folder: Path, imported: Imported) -> None:
     """
     load_files(imported.files)
     with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in imported.files.items():
-            write_text(folder / name, text)
+        write_creature(folder, imported.files)

@@ -13,9 +13,9 @@ from mjxgait.config.tables import build, read_toml
 from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
 from mjxgait.files import write_text
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.examination import Exams
 from mjxgait.training.folder import CERTIFICATE, EXAMS, command
-from mjxgait.training.stored import disk_errors
 
 
 def certify(run: Run | Place, config: Place | None = None) -> Certificate:

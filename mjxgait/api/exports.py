@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 from mjxgait.api.run import Place, Run
 from mjxgait.errors import UserError
-from mjxgait.training.stored import require_writable
+from mjxgait.training.disk import require_writable
 
 if TYPE_CHECKING:
     from mjxgait.animation.export import Character, WalkLoop

@@ -8,8 +8,8 @@ from mjxgait.api.exports import PAGES, Tell, folder_of, sized
 from mjxgait.api.run import Place, Run
 from mjxgait.api.studies import STUDY, champions_of_study
 from mjxgait.errors import UserError
+from mjxgait.training.disk import require_writable
 from mjxgait.training.folder import CHAMPION, CONFIG
-from mjxgait.training.stored import require_writable
 
 if TYPE_CHECKING:
     from mjxgait.champion import Champion

@@ -11,7 +11,7 @@ import numpy as np
 from mjxgait.api.run import Place, Run
 from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Config
-from mjxgait.config.tables import Table, build, merge, read_toml
+from mjxgait.config.tables import Table, build, merge, not_none, read_toml
 from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
 from mjxgait.creature.scale import at_step, facing, load_files, scaled
@@ -125,8 +125,7 @@ def train(
     }
     file = Path(config) if config else None
     resolved = configured(creature, file, use, WalkTargets.of(requested))
-    short = {"population": population, "generations": generations}
-    evolution = {key: value for key, value in short.items() if value is not None}
+    evolution = not_none(population=population, generations=generations)
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
     chosen = build(type(resolved), merge(table, settings or {}), "the settings given to train")
     creature = at_step(creature, chosen.rollout.step)
@@ -261,7 +260,7 @@ def evolve(
 
 def used(**named: str | None) -> dict[str, str]:
     """Return the names of the given controller and task; load user-defined code."""
-    given = {kind: text for kind, text in named.items() if text is not None}
+    given = not_none(**named)
     if not given:
         return {}
     from mjxgait.plugins.user_code import load

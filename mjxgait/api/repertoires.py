@@ -10,9 +10,10 @@ import numpy as np
 from rich.console import Console
 
 from mjxgait.api.make import load_creature
+from mjxgait.api.progress import Progress, pace
 from mjxgait.api.run import Place
 from mjxgait.config.schema import Config, Physics
-from mjxgait.config.tables import build, merge
+from mjxgait.config.tables import build, merge, not_none
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
@@ -20,13 +21,9 @@ from mjxgait.files import replaced, write_text
 from mjxgait.output import Output
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import WalkTargets, speed_of, with_targets
-from mjxgait.training.folder import (
-    check_parts,
-    create_run,
-    is_taken,
-    open_run,
-)
-from mjxgait.training.stored import disk_errors, locked
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import check_free, check_parts, create_run, open_run
+from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
     from mjxgait.animation.export import Character
@@ -221,11 +218,7 @@ def planned(
     check_parts(creature, base)
     _character(options.onto, creature)
     folder = options.out or Path("runs") / f"repertoire-{creature.name}"
-    if is_taken(folder):
-        raise UserError(
-            f"{folder}: holds something already; name another folder with --out, or go on with "
-            f"--resume {folder}"
-        )
+    check_free(folder)
     # Last, for it draws many poses.
     configs = {cell: settings_of(cell, grid, creature, base) for cell in grid.cells}
     return Planned(folder, creature, grid, configs)
@@ -281,10 +274,11 @@ def _settings(options: RepertoireRequest, creature: Creature) -> Config:
     """Return the settings that all walks share."""
     config = resolve_config(creature.settings.train, creature.name, Path(options.config))
     config = with_targets(config, creature, WalkTargets(gait=options.gait, style=options.style))
-    short = {"population": options.population, "generations": options.generations}
-    table: dict[str, object] = {"evolution": {k: v for k, v in short.items() if v is not None}}
-    table |= {} if options.seed is None else {"seed": options.seed}
-    table |= {} if options.physics is None else {"rollout": {"physics": options.physics}}
+    table = {
+        **not_none(seed=options.seed),
+        "evolution": not_none(population=options.population, generations=options.generations),
+        "rollout": not_none(physics=options.physics),
+    }
     return build(type(config), merge(dataclasses.asdict(config), table), "the options")
 
 
@@ -337,26 +331,19 @@ def _leave(
         console.print(f"{count} clips: {files[0]}, their places: {files[1]}")
 
 
-class _Screen:
-    """Progress as plain lines."""
-
-    def __init__(self, output: Output) -> None:
-        self.output = output
+class _Screen(Progress):
+    """Progress of one row of walks after the other."""
 
     def evolved(self, name: str, generation: int, last: int, done: "Advanced | None") -> None:
         if done is None:
             self.output.say(f"{name}: compiling")
             return
-        left = (last - generation) * done.seconds / max(len(done.lines), 1)
         alive = [1 - line["failures"] / max(line["episodes"], 1) for line in done.lines[-1]]
         self.output.say(
             f"{name}: generation {generation} of {last}, {len(alive)} walks side by side, "
             f"{sum(alive) / len(alive):.0%} of their episodes without a fall, "
-            f"{done.steps / done.seconds / 1e6:.2f} M steps/s, {left:.0f} s left"
+            f"{pace(done, last - generation)}"
         )
-
-    def examined(self, count: int, of: int) -> None:
-        self.output.say(f"examined in C MuJoCo: {count} of {of}")
 
     def changed(self, count: int, of: int) -> None:
         self.output.say(f"from one walk to another, in C MuJoCo: {count} of {of}")

@@ -23,9 +23,9 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
 from mjxgait.files import write_text, writing
-from mjxgait.output import Output
-from mjxgait.training.folder import CREATURE, is_taken
-from mjxgait.training.stored import locked
+from mjxgait.output import Output, duration
+from mjxgait.training.folder import CREATURE, check_free, write_creature
+from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
     from mjxgait.experiments.ablation.plan import Plan, Study
@@ -172,7 +172,7 @@ def prepared(options: AblateRequest) -> Prepared:
     words = (
         f"{len(plan.variants)} variants × {study.seeds} seeds = {len(plan.runs)} runs in "
         f"{len(parts)} program{'s' if len(parts) > 1 else ''}; at most "
-        f"{steps / 1e6:.0f} M creature-steps, about {_duration(3600 * hours)} at most on two cores"
+        f"{steps / 1e6:.0f} M creature-steps, about {duration(3600 * hours)} at most on two cores"
     )
     if hours > options.hours:
         raise UserError(
@@ -195,7 +195,7 @@ def finished(planned: Prepared, options: AblateRequest, output: Output) -> Path 
     folder, creature, plan = planned.folder, planned.creature, planned.plan
     screen, begin = _Progress(output), None
     if not options.resume:
-        _check_new(folder)
+        check_free(folder)
         for runs in planned.parts:
             check_spec(creature, runs[0].config)
         begin = partial(_create, folder, planned.study, creature)
@@ -292,28 +292,17 @@ class _Progress:
         speed = news["steps"] / news["seconds"] / 1e6
         self.output.say(
             f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, "
-            f"{_duration(left)} left"
+            f"{duration(left)} left"
         )
 
     def measuring(self, number: int, count: int) -> None:
         self.output.say(f"{number} of {count} champions examined in C MuJoCo")
 
 
-def _check_new(folder: Path) -> None:
-    """Refuse a folder that is not empty."""
-    if is_taken(folder):
-        raise UserError(
-            f"{folder}: holds something already; name another folder with --out, or go on with "
-            f"--resume {folder}"
-        )
-
-
 def _create(folder: Path, study: "Study", creature: Creature) -> None:
     """Make the folder of a study, with its exact settings and creature."""
     with writing(folder):
-        (folder / CREATURE).mkdir(parents=True, exist_ok=True)
-        for name, text in creature.files.items():
-            write_text(folder / CREATURE / name, text)
+        write_creature(folder / CREATURE, creature.files)
         write_text(folder / STUDY, dump_toml(study))
 
 
@@ -344,13 +333,3 @@ def _repeatable(options: AblateRequest) -> list[str]:
 
 def _hours(steps: int, programs: int) -> float:
     return (steps / EXPECTED_SPEED + 20 * programs) / 3600
-
-
-def _duration(seconds: float) -> str:
-    return (
-        f"{seconds / 3600:.1f} h"
-        if seconds > 5400
-        else f"{seconds / 60:.0f} min"
-        if seconds > 90
-        else f"{seconds:.0f} s"
-    )

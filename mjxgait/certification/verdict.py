@@ -12,6 +12,7 @@ import numpy as np
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.config.tables import flat
+from mjxgait.errors import listed
 from mjxgait.kinds import known_task, tasks
 
 
@@ -92,8 +93,7 @@ class Verdict:
             return self.reservation or "certified"
         if not self.failed:
             return "has no criteria"
-        names, more = [c.name for c in self.failed[:2]], len(self.failed) - 2
-        return f"fails {', '.join(names)}{f' and {more} more' if more > 0 else ''}"
+        return f"fails {listed([c.name for c in self.failed], 2)}"
 
 
 def verdict_on(criteria: Sequence[Criterion]) -> Verdict:

@@ -10,7 +10,7 @@ from mjxgait.api import certify, examine_expressions
 from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
 from mjxgait.files import write_text
-from mjxgait.training.stored import disk_errors, require_writable
+from mjxgait.training.disk import disk_errors, require_writable
 
 
 @dataclasses.dataclass(frozen=True)

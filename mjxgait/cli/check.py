@@ -14,7 +14,7 @@ from mjxgait.creature import load_creature as load_folder
 from mjxgait.errors import UserError
 from mjxgait.files import replaced, writing
 from mjxgait.tasks.walk.targets import WalkTargets, configured
-from mjxgait.training.stored import require_writable
+from mjxgait.training.disk import require_writable
 
 
 @dataclasses.dataclass(frozen=True)

@@ -35,8 +35,8 @@ def stress_command(arguments: Sequence[str]) -> int:
     from mjxgait.errors import UserError
     from mjxgait.files import write_text
     from mjxgait.rendering.curves import draw_stress, figure, save
+    from mjxgait.training.disk import disk_errors
     from mjxgait.training.folder import STRESS, open_champion
-    from mjxgait.training.stored import disk_errors
 
     if options.starts < 1:
         raise UserError(f"--starts {options.starts}: give at least one")

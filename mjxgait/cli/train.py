@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING
 
 from mjxgait.api import Run, load_creature
 from mjxgait.api.make import evolve
+from mjxgait.api.multi_seed import evolve_zoo
 from mjxgait.cli.options import parsed
 from mjxgait.cli.train_options import TrainOptions, options_of, short_options
-from mjxgait.cli.zoo import evolve_zoo
 from mjxgait.config.schema import Config, ExaminationConfig
-from mjxgait.config.tables import build, merge
+from mjxgait.config.tables import build, merge, not_none
 from mjxgait.controllers.expressions.written import with_expressions
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import at_step, parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.experiments.multi_seed import check_zoo, create_zoo, folders_of, is_zoo
+from mjxgait.output import Output
 from mjxgait.plugins.registry import meant
 from mjxgait.tasks.walk.targets import (
     TARGETS,
@@ -27,6 +28,7 @@ from mjxgait.tasks.walk.targets import (
     configured,
     hint,
 )
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     METRICS,
     PLOT,
@@ -37,7 +39,6 @@ from mjxgait.training.folder import (
     open_run,
     read_metrics,
 )
-from mjxgait.training.stored import disk_errors
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.training.screen import Screen
@@ -125,20 +126,22 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
     """Evolve several runs side by side; return the exit code."""
     if options.view or options.log or options.generation is not None:
         raise UserError("--runs: several runs have no --view, no --log and no --generation")
+    output = Output(quiet=options.quiet)
     if options.resume is None:
         assert options.runs is not None
         # On a cluster each run is a job of its own, so that every machine gets work.
         together = 1 if options.cluster else 0
         zoo = check_zoo(options.out, creature, config, options.runs)
         begin = partial(create_zoo, zoo, creature, config, options.runs, together)
-        return evolve_zoo(zoo, options.cluster, begin, options.quiet)
+        ended = evolve_zoo(zoo, output, options.cluster, begin)
+        return 0 if ended else INTERRUPTED
     other = options.scale or options.way != "forward"
     if options.runs is not None or other or config != default:
         raise UserError(
             f"{options.resume}: resumed runs keep their number, body and settings; only --cluster "
             "may be given"
         )
-    return evolve_zoo(options.resume, options.cluster, quiet=options.quiet)
+    return 0 if evolve_zoo(options.resume, output, options.cluster) else INTERRUPTED
 
 
 def _is_zoo(folder: Path | None) -> bool:
@@ -213,20 +216,15 @@ def _settings(options: TrainOptions) -> Config:
 
     The parser checks the types of options, not their ranges.
     """
-    short = {
-        "population": options.population,
-        "generations": options.generations,
-        "body": options.evolve_body,
-        "search": options.search,
-    }
     table = {
         "use": dataclasses.asdict(meant(options.settings.use)),
-        "evolution": {key: value for key, value in short.items() if value is not None},
-        "rollout": {
-            key: getattr(options, key)
-            for key in ("ground", "physics")
-            if getattr(options, key) is not None
-        },
+        "evolution": not_none(
+            population=options.population,
+            generations=options.generations,
+            body=options.evolve_body,
+            search=options.search,
+        ),
+        "rollout": not_none(ground=options.ground, physics=options.physics),
     }
     return build(
         type(options.settings), merge(dataclasses.asdict(options.settings), table), "the options"

@@ -102,6 +102,11 @@ def merge(base: Table, over: Table) -> dict[str, Any]:
     return merged
 
 
+def not_none(**values: Any) -> dict[str, Any]:
+    """Return the values that are not None, by name: the options that were given."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
 def build(cls: type[T], table: Table, where: str) -> T:
     """Build `cls` (a dataclass, nested ones included) from a table.
 

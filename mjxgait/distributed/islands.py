@@ -22,6 +22,7 @@ from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.evolution.state import EvolutionState, stop_reason
 from mjxgait.training.advance import versions
 from mjxgait.training.checkpoint import Checkpoints, Packed
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.examination import Examined, Examiner, Exams, why_ended
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import (
@@ -35,10 +36,10 @@ from mjxgait.training.folder import (
     append_lines,
     truncate_metrics,
 )
+from mjxgait.training.lock import locked_run
 from mjxgait.training.loop import conclude, interruptible, report
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
-from mjxgait.training.stored import disk_errors, locked_run
 
 OF_EACH = ("terms", "outcome", "fitness", "born", "origin", "rounds")
 """Arrays [P, ...] of a state, besides those of the genomes."""

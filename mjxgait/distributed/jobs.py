@@ -27,7 +27,8 @@ from mjxgait.training.advance import Generations, versions
 from mjxgait.training.checkpoint import Packed, pack
 from mjxgait.training.experiment import Batch, ProgramKey, Step, build_batch, one_row, program_key
 from mjxgait.training.folder import Line
-from mjxgait.training.spec import SimulatorSpec, make_spec
+from mjxgait.training.simulator import SimulatorSpec
+from mjxgait.training.spec import make_spec
 from mjxgait.training.stages import CompiledGeneration, Turn, at_once, compiled
 from mjxgait.types import Evaluation, RequestedTrials
 

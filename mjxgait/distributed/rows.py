@@ -88,7 +88,7 @@ class Rows:
         """Return the job of one piece."""
         recipe, piece = self.recipes[number], self.pieces[number]
         if self.state is not None:
-            return recipe, AdvanceRows(self.state.rows(piece), self._next_stop)
+            return recipe, AdvanceRows(self.state[piece], self._next_stop)
         planted = self.planted and {name: array[piece] for name, array in self.planted.items()}
         return recipe, AdvanceRows(None, self._next_stop, planted)
 
@@ -97,7 +97,7 @@ class Rows:
         advanced = _joined(done)
         self.state = advanced.packed
         for row, folder in enumerate(self.folders):
-            state = advanced.packed.row(row)
+            state = advanced.packed[row]
             lines = [line[row] for line in advanced.lines]
             self._write(folder, state, lines)
             if folder in self.images:
@@ -130,7 +130,7 @@ class Rows:
 
 def _joined(pieces: Sequence[Advanced]) -> Advanced:
     """Join the results of jobs that ran at the same time."""
-    rows = [piece.packed.row(row) for piece in pieces for row in range(piece.packed.count)]
+    rows = [piece.packed[row] for piece in pieces for row in range(piece.packed.count)]
     return Advanced(
         side_by_side(rows),
         [list(chain(*lines)) for lines in zip(*(piece.lines for piece in pieces), strict=True)],

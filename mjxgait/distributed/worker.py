@@ -46,7 +46,7 @@ class RemoteWorker:
         Raises:
           OSError: there is no room for a creature's files.
         """
-        from mjxgait.training.stored import try_room
+        from mjxgait.training.disk import try_room
 
         try_room(Path(tempfile.gettempdir()), ROOM)
         return os.getpid()
@@ -67,7 +67,7 @@ def _turn(name: str, patience: float = -1.0) -> Iterator[None]:
     import filelock
     import jax
 
-    from mjxgait.training.stored import try_room
+    from mjxgait.training.disk import try_room
 
     folder = Path(jax.config.values["jax_compilation_cache_dir"])
     try:

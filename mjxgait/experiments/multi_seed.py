@@ -16,15 +16,15 @@ from mjxgait.errors import UserError
 from mjxgait.files import write_text
 from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.video import champion_of
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
+    check_free,
     check_parts,
     create_run,
-    is_taken,
     new_run_folder,
 )
-from mjxgait.training.stored import disk_errors
 
 ZOO = "zoo.toml"
 
@@ -82,11 +82,7 @@ def check_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -
         )
     check_parts(creature, config)
     zoo = zoo or new_run_folder(f"{creature.name}-zoo", config.seed)
-    if is_taken(zoo):
-        raise UserError(
-            f"{zoo}: holds something already; name another folder with --out, or go on with "
-            f"--resume {zoo}"
-        )
+    check_free(zoo)
     return zoo
 
 

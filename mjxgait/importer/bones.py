@@ -9,7 +9,8 @@ import math
 import mujoco
 import numpy as np
 
-from mjxgait.importer.notes import Notes, listed
+from mjxgait.errors import listed
+from mjxgait.importer.notes import Notes
 from mjxgait.importer.shapes import HIDDEN, Bar, bar, mark
 
 LEAST_SHARE = 0.01

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.errors import UserError
-from mjxgait.importer.notes import Notes, listed
+from mjxgait.errors import UserError, listed
+from mjxgait.importer.notes import Notes
 from mjxgait.importer.source import Places, Source, load_mesh, lost, numbers
 
 KEPT = ("link", "joint", "material")

@@ -9,14 +9,14 @@ import numpy as np
 
 from mjxgait.creature import geometry
 from mjxgait.creature.settings import RigSettings
-from mjxgait.errors import UserError
+from mjxgait.errors import UserError, listed
 from mjxgait.importer.anatomy import Anatomy, in_plane
 from mjxgait.importer.balance import steady_balance
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.bones import add_bones
 from mjxgait.importer.drive import step_if_narrow, swing_arms
 from mjxgait.importer.find import find_anatomy
-from mjxgait.importer.notes import Notes, listed, one_line, plain_names, tell_dropped, tell_left_out
+from mjxgait.importer.notes import Notes, one_line, plain_names, tell_dropped, tell_left_out
 from mjxgait.importer.orient import (
     find_forward,
     find_mirror,

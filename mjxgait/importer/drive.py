@@ -9,8 +9,9 @@ from collections.abc import Collection
 import mujoco
 import numpy as np
 
+from mjxgait.errors import listed
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.notes import Notes
 from mjxgait.importer.soles import Stance
 from mjxgait.importer.stance import stance_of
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.geometry import ancestors, subtree
-from mjxgait.errors import UserError
+from mjxgait.errors import UserError, listed
 from mjxgait.importer.anatomy import (
     HINGE,
     SLIDE,
@@ -24,7 +24,7 @@ from mjxgait.importer.legs import (
     lowered_limbs,
     movable_joints,
 )
-from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.notes import Notes
 from mjxgait.importer.shapes import shapes_of
 from mjxgait.importer.spec import copy_bodies
 

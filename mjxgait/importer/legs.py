@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.geometry import ancestors, subtree
-from mjxgait.errors import UserError
+from mjxgait.errors import UserError, listed
 from mjxgait.importer.anatomy import FREE, HINGE, SLIDE, Anatomy
-from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.notes import Notes
 from mjxgait.importer.shapes import Shape
 
 SAME_LEVEL = 0.2

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.geometry import ancestors, subtree
+from mjxgait.errors import listed
 
 Confidence = Literal["high", "medium", "low"]
 
@@ -56,11 +57,6 @@ class Notes:
         lines += ["Guesses (change them in creature.toml):"]
         lines += [f"  - {g.what} = {g.value}  [{g.confidence}] {g.reason}" for g in self.guesses]
         return "\n".join(lines)
-
-
-def listed(names: list[str], most: int = 6) -> str:
-    """`a, b, c` or `a, b, c and 7 more`."""
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def one_line(text: str) -> str:

@@ -4,8 +4,9 @@ import re
 
 import numpy as np
 
+from mjxgait.errors import listed
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.notes import Confidence, Notes, listed
+from mjxgait.importer.notes import Confidence, Notes
 
 FRONT_WORDS, BACK_WORDS = (
     ("front", "fore", "head", "nose", "neck", "snout"),

@@ -12,8 +12,8 @@ import numpy as np
 from mjxgait.animation.clips.clip import Rig, written
 from mjxgait.animation.clips.read_glb import rig_of_glb
 from mjxgait.animation.clips.read_text import rig_of_bvh
-from mjxgait.errors import UserError
-from mjxgait.importer.notes import Confidence, Guess, Notes, listed, plain_names
+from mjxgait.errors import UserError, listed
+from mjxgait.importer.notes import Confidence, Guess, Notes, plain_names
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_arms import hanging
 from mjxgait.importer.rig_hinges import Hinge, hinges_of

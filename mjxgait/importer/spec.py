@@ -12,9 +12,9 @@ import numpy as np
 from mjxgait.creature.creature import REST
 from mjxgait.creature.geometry import quaternion
 from mjxgait.creature.scale import model_text
-from mjxgait.errors import UserError
+from mjxgait.errors import UserError, listed
 from mjxgait.importer.anatomy import BALL, HINGE, Anatomy
-from mjxgait.importer.notes import Notes, listed, plain_names
+from mjxgait.importer.notes import Notes, plain_names
 from mjxgait.importer.shapes import HIDDEN, copy_geoms
 
 EMPTY = """

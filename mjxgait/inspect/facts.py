@@ -30,7 +30,7 @@ from mjxgait.plugins import make_task, resolve_config
 from mjxgait.plugins.registry import what_ends
 from mjxgait.tasks.base import Task
 from mjxgait.training.folder import CERTIFICATE, STRESS, Line, kept_champion
-from mjxgait.training.stored import running
+from mjxgait.training.lock import running
 
 KINDS = {
     Origin.INITIAL: "initial",

@@ -12,7 +12,8 @@ from mjxgait.inspect.sections import Facts
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.inspect.text import ago, show
 from mjxgait.training.folder import CONFIG
-from mjxgait.training.stored import running, stored_generations, why_empty
+from mjxgait.training.lock import running, why_empty
+from mjxgait.training.stored import stored_generations
 
 
 def runs_in(folder: Path) -> list[Path]:

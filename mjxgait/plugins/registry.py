@@ -4,13 +4,13 @@ import dataclasses
 import functools
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mjxgait.config import layers
 from mjxgait.config.schema import Config, RolloutConfig, UseConfig
-from mjxgait.config.tables import STRICT, Table, build
+from mjxgait.config.tables import STRICT, Table, build, not_none
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.kinds import controller_kind, meant_of_grown, task_kind
@@ -68,10 +68,8 @@ def what_ends(creature: Creature, config: RolloutConfig) -> Termination:
     """Return the termination conditions: the creature's, overridden by the config's."""
     if not config.terminate:
         return Termination(min_up=-1.0, height=(-np.inf, np.inf), touch=False)
-    given: dict[str, Any] = dataclasses.asdict(config.termination)
-    return dataclasses.replace(
-        creature.settings.termination, **{k: v for k, v in given.items() if v is not None}
-    )
+    own = not_none(**dataclasses.asdict(config.termination))
+    return dataclasses.replace(creature.settings.termination, **own)
 
 
 def config_class(use: UseConfig) -> type[Config]:

@@ -21,6 +21,7 @@ from mjxgait.rendering.filmstrip import draw_filmstrip
 from mjxgait.rendering.gaitplots import gait_figures
 from mjxgait.rendering.video import LOOP_SECONDS, champion_of
 from mjxgait.rendering.walk import Walk
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     CHAMPION,
     METRICS,
@@ -29,7 +30,7 @@ from mjxgait.training.folder import (
     open_run,
     read_metrics,
 )
-from mjxgait.training.stored import disk_errors, why_empty
+from mjxgait.training.lock import why_empty
 
 
 def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMATS) -> list[Path]:

@@ -16,8 +16,8 @@ from mjxgait.rendering.floor import DARK_INK, font
 from mjxgait.rendering.gl import gl_pictures
 from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.walk import Walk, record_walk
+from mjxgait.training.disk import require_writable
 from mjxgait.training.folder import open_champion
-from mjxgait.training.stored import require_writable
 
 FORMATS = (".webp", ".gif", ".mp4", ".png")
 PAPER = (255, 255, 255, 200)

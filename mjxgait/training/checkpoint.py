@@ -19,6 +19,7 @@ import orbax.checkpoint as ocp
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import check_generator, key_from
 from mjxgait.evolution.state import EvolutionState
+from mjxgait.training.disk import disk_errors, try_room
 from mjxgait.training.stored import (
     FOLDER,
     MANIFEST,
@@ -26,10 +27,8 @@ from mjxgait.training.stored import (
     STATE,
     Manifest,
     array_hash,
-    disk_errors,
     read_stored,
     stored_generations,
-    try_room,
 )
 from mjxgait.types import by_name
 
@@ -58,12 +57,8 @@ class Packed:
         """Return the state with these arrays replaced."""
         return Packed({**self.arrays, **arrays}, self.key_impl)
 
-    def row(self, number: int) -> "Packed":
-        """Return the state of one run of a batch."""
-        return Packed({name: array[number] for name, array in self.arrays.items()}, self.key_impl)
-
-    def rows(self, some: slice) -> "Packed":
-        """Return the states of some runs of a batch."""
+    def __getitem__(self, some: int | slice) -> "Packed":
+        """Return the state of one run of a batch, or the states of some."""
         return Packed({name: array[some] for name, array in self.arrays.items()}, self.key_impl)
 
     @property
@@ -90,7 +85,7 @@ class Packed:
 
 
 def side_by_side(rows: Sequence[Packed]) -> Packed:
-    """Stack the states of several runs into a batch, the inverse of `Packed.row`."""
+    """Stack the states of several runs into a batch, the inverse of indexing."""
     first = rows[0]
     arrays = {name: np.stack([row.arrays[name] for row in rows]) for name in first.arrays}
     return Packed(arrays, first.key_impl)

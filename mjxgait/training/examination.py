@@ -15,10 +15,10 @@ from mjxgait.champion import Champion
 from mjxgait.config.schema import Config, ExaminationConfig
 from mjxgait.config.tables import STORED, Flag, Index, Text
 from mjxgait.evolution.state import EvolutionState
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import Experiment
 from mjxgait.training.folder import Line, read_records, write_lines
 from mjxgait.training.prescreen import Prescreen
-from mjxgait.training.stored import disk_errors
 
 
 @dataclasses.dataclass(frozen=True)

@@ -22,7 +22,8 @@ from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.simulation.rollout import Episodes, Simulator
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.generation import RunParams, evaluate, first_state
-from mjxgait.training.spec import BodyParams, SimulatorSpec, make_spec
+from mjxgait.training.simulator import BodyParams, SimulatorSpec
+from mjxgait.training.spec import make_spec
 from mjxgait.training.stages import (
     CompiledGeneration,
     Turn,

@@ -36,7 +36,7 @@ from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, read_text, write_te
 from mjxgait.plugins import build_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.user_code import KINDS, places_of
-from mjxgait.training.stored import disk_errors
+from mjxgait.training.disk import disk_errors
 
 CONFIG, OWN = "config.toml", "own.toml"
 """Files in a run folder: settings; and FILE.py:CLASS of a user-defined controller or task."""
@@ -198,6 +198,21 @@ def is_taken(folder: Path) -> bool:
         raise UserError(f"{folder}: cannot be read ({error.strerror})") from None
 
 
+def check_free(folder: Path, again: str = "--resume") -> None:
+    """Refuse a folder for several new runs that is not empty.
+
+    again: command or option that goes on with what the folder holds.
+
+    Raises:
+      UserError: it is not empty, or cannot be read.
+    """
+    if is_taken(folder):
+        raise UserError(
+            f"{folder}: holds something already; name another folder with --out, or go on with "
+            f"{again} {folder}"
+        )
+
+
 def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
     """Create the run folder with the exact creature and settings, by default under runs/.
 
@@ -206,16 +221,16 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
     """
     folder = check_run(folder, creature, config)
     with writing(folder):
-        keep_body(folder / CREATURE, creature)
+        write_creature(folder / CREATURE, creature.files)
         keep_places(folder, config.use)
         write_text(folder / CONFIG, f"{_made_by(own_version())}\n{dump_toml(config)}")
     return folder
 
 
-def keep_body(folder: Path, creature: Creature) -> None:
-    """Write a creature folder."""
+def write_creature(folder: Path, files: Mapping[str, str]) -> None:
+    """Write a creature folder. files: texts by name."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, text in creature.files.items():
+    for name, text in files.items():
         write_text(folder / name, text)
 
 

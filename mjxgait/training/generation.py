@@ -25,7 +25,7 @@ from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.base import Task, in_order, score
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.spec import BodyParams, SimulatorSpec
+from mjxgait.training.simulator import BodyParams, SimulatorSpec
 from mjxgait.types import Evaluation, RequestedTrials, choose, pytree
 
 LEADERS = 16

@@ -18,9 +18,10 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.files import DamagedFile, read_bytes, write_bytes
 from mjxgait.training.checkpoint import first_difference
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import open_run
-from mjxgait.training.stored import disk_errors, read_stored
+from mjxgait.training.stored import read_stored
 from mjxgait.types import by_name
 
 INITIAL = "initial.npz"

@@ -21,6 +21,7 @@ from mjxgait.lru import LruCache
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.training.advance import Generations, versions
 from mjxgait.training.checkpoint import Checkpoints
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.examination import Examined, Examiner, Exams, Validation, why_ended
 from mjxgait.training.experiment import Batch, Experiment, Step, build_experiment, one_row
 from mjxgait.training.folder import (
@@ -31,10 +32,10 @@ from mjxgait.training.folder import (
     METRICS,
     STRESS,
     append_lines,
-    keep_body,
     kept_champion,
     read_metrics,
     truncate_metrics,
+    write_creature,
 )
 from mjxgait.training.initial import (
     Genomes,
@@ -44,10 +45,10 @@ from mjxgait.training.initial import (
     planted,
     read_initial,
 )
+from mjxgait.training.lock import locked_run
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.stages import CompiledGeneration
-from mjxgait.training.stored import disk_errors, locked_run
 
 
 def train(
@@ -183,7 +184,7 @@ def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examine
         write_champion(examined.champion, creature, folder / CHAMPION)
         body = examined.champion.embodied(creature)
         if body.digest != creature.digest:
-            keep_body(folder / BODY, body)
+            write_creature(folder / BODY, body.files)
         write_text(folder / CERTIFICATE, examined.certificate.to_json())
         if examined.beyond:
             text = json.dumps(examined.beyond.document(), indent=2) + "\n"

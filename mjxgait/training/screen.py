@@ -17,7 +17,7 @@ from mjxgait.certification.advice import ADVICE
 from mjxgait.certification.describe import in_words
 from mjxgait.config.schema import Config
 from mjxgait.creature.ground.spec import FLAT
-from mjxgait.output import LOG, Output
+from mjxgait.output import LOG, Output, duration
 from mjxgait.tasks.walk.target_criteria import in_the_way
 from mjxgait.training.folder import (
     CHAMPION,
@@ -210,13 +210,6 @@ def what_ends_sooner(config: Config) -> str:
         and bool(evolution.forced.patience),
     }
     return ", or ".join(reason for reason, holds in reasons.items() if holds)
-
-
-def duration(seconds: float) -> str:
-    """Return a time in s, min or h, as text."""
-    if seconds < 120:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
 def _best(last: Line) -> str:

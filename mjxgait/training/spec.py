@@ -1,66 +1,29 @@
-"""Simulator specification of a run, and the body parameters that are inputs of the program."""
+"""Simulator specification of a run, chosen by its creature; that of a model, and evolved sizes."""
 
 import dataclasses
 import functools
-from functools import partial
-from typing import Any, Protocol, TypeVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.sharding import Mesh
 from typing_extensions import override
 
-from mjxgait.config.schema import Config, RolloutConfig
+from mjxgait.config.schema import Config
 from mjxgait.controllers.base import Bodied, BodiedController, Controller
-from mjxgait.controllers.observations import check_observations
-from mjxgait.controllers.sims_brain.controller import capacity_of
-from mjxgait.controllers.sims_brain.genotype import Capacity
-from mjxgait.controllers.sims_brain.operators import Genotype
-from mjxgait.controllers.sims_brain.phenotype import anatomy, body_of
-from mjxgait.controllers.sims_brain.reference_body import DRAG, FRICTION, GRAVITY, HARDEST
-from mjxgait.controllers.spd import Drive
 from mjxgait.creature import Creature
-from mjxgait.creature.body import Body, Ends, GivenBody, given_body, given_ends
+from mjxgait.creature.body import Body, Ends, given_body, given_ends
 from mjxgait.creature.proportions import Proportions, extreme_bodies, proportions
 from mjxgait.creature.settings import Termination
 from mjxgait.errors import UserError
-from mjxgait.kinds import in_water
 from mjxgait.physics import make_plant
-from mjxgait.physics.batched_trees.plant import TreePlant
-from mjxgait.physics.batched_trees.tree import Surroundings
 from mjxgait.plugins import make_controller, make_task
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import what_ends
-from mjxgait.simulation.rollout import AXIS, Simulator
-from mjxgait.tasks.base import Task
+from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.starts import Starts
-from mjxgait.types import ModelPlant, Plant, pytree
-
-PlantOf_contra = TypeVar("PlantOf_contra", contravariant=True)
-Genome_contra = TypeVar("Genome_contra", contravariant=True)
-
-
-class Growth(Protocol[PlantOf_contra, Genome_contra]):
-    """Computation of the simulated body from a genome."""
-
-    def body(self, plant: PlantOf_contra, genome: Genome_contra, start: Starts) -> Starts:
-        """Return the start [] with the genome's own body."""
-        ...
-
-
-@dataclasses.dataclass(frozen=True)
-class GraphGrowth(Growth[TreePlant, Genotype]):
-    """Modular bodies from graphs."""
-
-    capacity: Capacity
-
-    def body(self, plant: TreePlant, genome: Genotype, start: Starts) -> Starts:
-        """Parts without a hinge are not bent; on land bodies rest on the ground."""
-        tree = body_of(genome.graph, self.capacity).tree
-        bent = start.qpos[7:] * tree.moves[1:]
-        qpos = plant.rested(tree, jnp.concatenate([start.qpos[:7], bent]))
-        return dataclasses.replace(start, qpos=qpos, numbers=tree)
+from mjxgait.training.grown_spec import GrownSpec
+from mjxgait.training.simulator import BodyParams, Growth, SimulatorSpec, assembled
+from mjxgait.types import ModelPlant
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -98,46 +61,6 @@ def growth_of(creature: Creature, config: Config) -> SizeGrowth | None:
     if not extreme_bodies(creature, config.evolution.body):
         return None
     return SizeGrowth(proportions(creature))
-
-
-LANES = 64
-"""Simulations of modular bodies per device."""
-
-
-@pytree
-class BodyParams:
-    """All body parameters that the program reads. plant: see `Plant.parameters`."""
-
-    body: GivenBody
-    ends: Ends
-    plant: object
-
-
-class SimulatorSpec(Protocol):
-    """Specification of a simulator on the host, before its program is traced."""
-
-    @property
-    def creature(self) -> Creature:
-        """The creature with the settings that shape its program."""
-        ...
-
-    @property
-    def numbers(self) -> BodyParams | None:
-        """Body parameters to pass to the program; None if the body is constant in it or grows."""
-        ...
-
-    @property
-    def own(self) -> Simulator:
-        """The simulator with constant body parameters, for the host's own queries."""
-        ...
-
-    def embodied(self, starts: Starts) -> Starts:
-        """Return the starts with the body parameters that follow from them."""
-        ...
-
-    def simulator(self, numbers: BodyParams | None = None) -> Simulator:
-        """Return the simulator of the creature, or of the body with these parameters."""
-        ...
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -192,83 +115,7 @@ class ModelSpec:
             controller = BodiedController(controller, sizes, self.config.evolution.body)
         task = make_task(body, step, ends, self.config)
         growth, rollout = self.growth, self.config.rollout
-        return _assembled(body, step, plant, controller, task, rollout, self.lanes, growth)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class GrownSpec:
-    """Implementation of `SimulatorSpec`.
-
-    Every genome grows its own body. creature: gives settings and time step only.
-    """
-
-    creature: Creature
-    config: Config
-
-    @property
-    def numbers(self) -> None:
-        """See `SimulatorSpec`."""
-        return None
-
-    @functools.cached_property
-    def own(self) -> Simulator:
-        """See `SimulatorSpec`."""
-        return self.simulator()
-
-    def embodied(self, starts: Starts) -> Starts:
-        """See `SimulatorSpec`."""
-        return starts
-
-    def simulator(self, numbers: BodyParams | None = None) -> Simulator:
-        """See `SimulatorSpec`."""
-        config, step = self.config, float(self.creature.model.opt.timestep)
-        settings: Any = config.controller
-        capacity = capacity_of(settings)
-        body = anatomy(capacity.links)
-        ends = what_ends(self.creature, config.rollout)
-        controller = make_controller(body, step, config)
-        task = make_task(body, step, ends, config)
-        wet = in_water(config.use.task)
-        around = Surroundings(
-            step=step,
-            friction=FRICTION,
-            contact=HARDEST * step,
-            floor=not wet,
-            gravity=0.0 if wet else GRAVITY,
-            drag=DRAG if wet else 0.0,
-            lit="light" in task.adds,
-        )
-        plant, growth = TreePlant(around), GraphGrowth(capacity)
-        return _assembled(body, step, plant, controller, task, config.rollout, LANES, growth)
-
-
-def _assembled(
-    body: Body,
-    step: float,
-    plant: Plant,
-    controller: Controller,
-    task: Task,
-    rollout: RolloutConfig,
-    lanes: int,
-    growth: Growth | None,
-) -> Simulator:
-    """Assemble a simulator. lanes: used if the settings do not say.
-
-    Raises:
-      UserError: the controller reads an observation that the body does not have.
-    """
-    check_observations(controller.reads, task.adds)
-    return Simulator(
-        creature=body,
-        plant=plant,
-        controller=controller,
-        drive=Drive(body, step, controller.command),
-        task=task,
-        steps=max(round(rollout.seconds / step), 1),
-        lanes=rollout.lanes or lanes,
-        mesh=Mesh(np.array(jax.devices()), (AXIS,)),
-        bodies=None if growth is None else partial(growth.body, plant),
-    )
+        return assembled(body, step, plant, controller, task, rollout, self.lanes, growth)
 
 
 def make_spec(creature: Creature, config: Config) -> SimulatorSpec:

@@ -33,7 +33,7 @@ from mjxgait.training.generation import (
     promote,
     propose,
 )
-from mjxgait.training.spec import BodyParams, SimulatorSpec
+from mjxgait.training.simulator import BodyParams, SimulatorSpec
 from mjxgait.types import Evaluation, RequestedTrials, Tree
 
 
@@ -195,9 +195,8 @@ def compile_stages(
 def begin(
     spec: SimulatorSpec, numbers: BodyParams | None, settings: Config, key: jax.Array
 ) -> EvolutionState:
-    """All runs, single or in a batch, share one compiled function: they begin
-    with the same bits.
-    """
+    """Return the state of a run before its first evaluation."""
+    # One compiled function for all runs, single or in a batch: they begin with the same bits.
     return _beginning()(spec, numbers, settings, key)
 
 
@@ -215,5 +214,6 @@ def stacked(trees: Sequence[Tree]) -> Tree:
 
 
 def embodied(spec: SimulatorSpec, starts: Starts) -> Starts:
-    """Jitted, or each of its hundreds of operations is compiled alone."""
+    """Return the starts with the parameters of their bodies."""
+    # Else each of its hundreds of operations would be compiled alone.
     return jax.jit(spec.embodied)(starts)

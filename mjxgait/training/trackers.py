@@ -13,9 +13,9 @@ from typing import Any, Protocol
 from mjxgait.config.tables import read_toml
 from mjxgait.errors import UserError
 from mjxgait.extras import install_command
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import CONFIG, METRICS, Line, read_metrics
 from mjxgait.training.screen import Screen
-from mjxgait.training.stored import disk_errors
 
 GROUPS = {"term_": "term/", "outcome_": "outcome/"}
 """Beginnings of names in `metrics.jsonl`, and the groups that trackers show them in."""

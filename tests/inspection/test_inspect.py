@@ -26,7 +26,7 @@ from mjxgait.inspect import (
     text,
 )
 from mjxgait.training.folder import CERTIFICATE, CHAMPION, STRESS
-from mjxgait.training.stored import locked
+from mjxgait.training.lock import locked
 
 
 def tell(capsys, *arguments):

@@ -8,7 +8,7 @@ import pytest
 
 from mjxgait.cli.train import _plot_fitness
 from mjxgait.errors import UserError
-from mjxgait.training.stored import disk_errors, require_writable, try_room
+from mjxgait.training.disk import disk_errors, require_writable, try_room
 
 RUN = Path("runs/a")
 WRAPPED = (

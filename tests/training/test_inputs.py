@@ -14,7 +14,7 @@ from mjxgait.creature.overlap import find_crossings
 from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.training.experiment import Batch, build_experiment
-from mjxgait.training.spec import BodyParams
+from mjxgait.training.simulator import BodyParams
 from mjxgait.types import BodyState
 
 INPUTS = {"body": "inputs", "physics": "auto"}

@@ -17,16 +17,16 @@ from helpers import STOOL, said_by
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.training import stored
+from mjxgait.training import lock
 from mjxgait.training.folder import create_run
-from mjxgait.training.stored import LOCK, locked, running, why_empty
+from mjxgait.training.lock import LOCK, locked, running, why_empty
 
 pytest.importorskip("fcntl", reason="this system has no flock")
 
 HOLD = """
 import sys
 from pathlib import Path
-from mjxgait.training.stored import locked
+from mjxgait.training.lock import locked
 with locked(Path(sys.argv[1])):
     print("locked", flush=True)
     sys.stdin.read()
@@ -73,15 +73,15 @@ def test_reading_the_lock_does_not_block_a_start(tmp_path: Path, monkeypatch):
     """A reader holds the lock for a moment."""
     (tmp_path / LOCK).touch()
     looks = (tmp_path / LOCK).open("rb")
-    assert stored._try(looks, shared=True)
-    monkeypatch.setattr("mjxgait.training.stored.time.sleep", lambda seconds: looks.close())
+    assert lock._try(looks, shared=True)
+    monkeypatch.setattr("mjxgait.training.lock.time.sleep", lambda seconds: looks.close())
     with locked(tmp_path):
         assert running(tmp_path) == ME
 
 
 def test_a_just_removed_lock_is_not_mistaken_for_the_new_one(tmp_path: Path, monkeypatch):
     """Else two processes would hold the folder: one by the old file, one by the new."""
-    attempt, files = stored._try, []
+    attempt, files = lock._try, []
 
     def late(file, shared=False):
         if not files:
@@ -90,7 +90,7 @@ def test_a_just_removed_lock_is_not_mistaken_for_the_new_one(tmp_path: Path, mon
         return attempt(file, shared)
 
     with monkeypatch.context() as patch:
-        patch.setattr(stored, "_try", late)
+        patch.setattr(lock, "_try", late)
         held = locked(tmp_path)
         held.__enter__()
     assert len(files) == 2

@@ -11,7 +11,8 @@ from rich.console import Console
 from mjxgait.certification import Certificate, CertificateConfig
 from mjxgait.certification.advice import ADVICE, advice
 from mjxgait.certification.criteria import Criterion, Measure
-from mjxgait.training.screen import Screen, duration
+from mjxgait.output import duration
+from mjxgait.training.screen import Screen
 
 
 @pytest.mark.parametrize(

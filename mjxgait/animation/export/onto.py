@@ -33,7 +33,7 @@ from mjxgait.animation.export.skeleton import (
 )
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import DOWN, geom_reach
-from mjxgait.errors import UserError
+from mjxgait.errors import UserError, listed
 from mjxgait.files import write_bytes, writing
 
 LOOP = "-loop"
@@ -104,21 +104,20 @@ def bones_of(creature: Creature, character: Character) -> dict[str, int]:
     found = {part: character.bones.get(bone, ()) for part, bone in rig.bones.items()}
     if lost := [rig.bones[part] for part, nodes in found.items() if not nodes]:
         raise UserError(
-            f"{character.path}: lacks bones of which {creature.name} was made: {_listed(lost)}; name "
+            f"{character.path}: lacks bones of which {creature.name} was made: {_quoted(lost)}; name "
             f"the file that was imported ({rig.file}), or import this one and train it"
         )
     if twice := [rig.bones[part] for part, nodes in found.items() if len(nodes) > 1]:
         raise UserError(
-            f"{character.path}: has several bones called {_listed(twice)}; give each its own name, "
+            f"{character.path}: has several bones called {_quoted(twice)}; give each its own name, "
             "import the file again, and train it"
         )
     return {part: nodes[0] for part, nodes in found.items()}
 
 
-def _listed(names: list[str]) -> str:
+def _quoted(names: list[str]) -> str:
     """Names in quotes, and the number of those left out."""
-    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    return ", ".join(f'"{name}"' for name in names[:SHOWN]) + more
+    return listed([f'"{name}"' for name in names], SHOWN)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -165,7 +164,7 @@ def _fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> F
     hip = creature.frame.hip_height
     if not (off < SLACK * hip).all():
         worst = [list(bones)[i] for i in np.argsort(-off) if not off[i] < SLACK * hip]
-        names = _listed([creature.settings.rig.bones[part] for part in worst])
+        names = _quoted([creature.settings.rig.bones[part] for part in worst])
         raise UserError(
             f"{character.path}: at rest its bones {names} are up to {off.max() / hip:.0%} of the hip "
             f"height off the parts of {creature.name}; name the file that was imported "

@@ -15,7 +15,7 @@ from mjxgait.animation.keys.bring import Brought
 from mjxgait.animation.keys.cycle import interpolated
 from mjxgait.certification import criteria_of, read_certificate, verdict_of
 from mjxgait.config.schema import Config
-from mjxgait.config.tables import Table, build, merge
+from mjxgait.config.tables import Table, build, merge, not_none
 from mjxgait.controllers.key_poses.config import smooth
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -26,8 +26,8 @@ from mjxgait.rendering.filmstrip import Kept, draw_front, front_shape
 from mjxgait.rendering.video import LOOP_SECONDS, champion_of
 from mjxgait.rendering.walk import Walk
 from mjxgait.tasks.walk.textbook_start import ORDERED
-from mjxgait.training.folder import CERTIFICATE, create_run, is_taken, open_run
-from mjxgait.training.stored import disk_errors
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import CERTIFICATE, check_free, create_run, open_run
 
 KEYS = "keys.json"
 """File in the run folder with the cycle that the run stays near."""
@@ -76,8 +76,7 @@ def base_settings(
     """
     ordered = merge(creature.settings.train, {"evolution": ORDERED})
     resolved = resolve_config(ordered, creature.name, config)
-    short = {"population": population, "generations": generations}
-    evolution = {key: value for key, value in short.items() if value is not None}
+    evolution = not_none(population=population, generations=generations)
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
     chosen = build(type(resolved), merge(table, others or {}), "the options")
     if chosen.use.controller != "poses":
@@ -290,11 +289,7 @@ def check_front(out: Path, keeps: Sequence[float]) -> None:
     Raises:
       UserError: the folder is not empty, or a share is there twice.
     """
-    if is_taken(out):
-        raise UserError(
-            f"{out}: holds something already; name another folder with --out, or go on with "
-            f"mjxgait refine --resume {out}"
-        )
+    check_free(out, "mjxgait refine --resume")
     if len(set(keeps)) < len(keeps):
         raise UserError("--keep: a share is there twice")
 

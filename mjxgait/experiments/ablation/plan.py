@@ -19,6 +19,7 @@ from mjxgait.config.tables import (
     Whole,
     build,
     merge,
+    not_none,
     read_toml,
 )
 from mjxgait.creature import Creature
@@ -141,14 +142,7 @@ def read_study(file: Path, over: Mapping[str, object]) -> Study:
     """
     path = _find(file)
     given = build(Study, read_toml(path), str(path))
-    study = build(
-        Study,
-        merge(
-            dataclasses.asdict(given),
-            {key: value for key, value in over.items() if value is not None},
-        ),
-        str(path),
-    )
+    study = build(Study, merge(dataclasses.asdict(given), not_none(**over)), str(path))
     scale = (study.generations + 1) / (given.generations + 1)
     scaled = [
         dataclasses.replace(

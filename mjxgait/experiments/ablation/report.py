@@ -27,8 +27,8 @@ from mjxgait.experiments.ablation.findings import (
 from mjxgait.experiments.ablation.plan import Plan
 from mjxgait.experiments.ablation.rows import Result
 from mjxgait.files import replaced, write_text
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import Line
-from mjxgait.training.stored import disk_errors
 
 NAMES = {
     "walk": "body lengths per second covered before a fall or the end of 22 s, mean over 16 unseen "

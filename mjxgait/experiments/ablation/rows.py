@@ -28,6 +28,7 @@ from mjxgait.plugins.user_code import load_all, loaded
 from mjxgait.processes import process_per_core, survivable
 from mjxgait.reference.starts import join, nominal_starts, perturbed_starts
 from mjxgait.training.checkpoint import Checkpoints, Packed
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     CREATURE,
     METRICS,
@@ -39,7 +40,7 @@ from mjxgait.training.folder import (
     write_lines,
 )
 from mjxgait.training.loop import interruptible
-from mjxgait.training.stored import disk_errors, is_number
+from mjxgait.training.stored import is_number
 
 if TYPE_CHECKING:
     from jax.tree_util import PyTreeDef

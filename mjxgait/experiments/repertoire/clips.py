@@ -35,7 +35,7 @@ from mjxgait.reference.changing import HaltingReference
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.video import LOOP_SECONDS, champion_of
 from mjxgait.rendering.walk import WARMUP, Walk
-from mjxgait.training.stored import disk_errors
+from mjxgait.training.disk import disk_errors
 from mjxgait.web.page import driven_page, save_page
 
 IDLE = "idle"

@@ -198,7 +198,7 @@ def evolve(
     found = first.to_the_end(scheduler, stopped)
     if found is None or not turning:
         return found is not None
-    by_speed = {cell.speed: found.row(row) for row, cell in enumerate(straight)}
+    by_speed = {cell.speed: found[row] for row, cell in enumerate(straight)}
     begin = planted(turning, by_speed)
     second = _side(folder, creature, grid, turning, partial(tell, "turning"), begin)
     return second.to_the_end(scheduler, stopped) is not None

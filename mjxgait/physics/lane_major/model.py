@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
+from mjxgait.errors import listed
 from mjxgait.physics.derived import ObservationLayout
 
 PLANE, SPHERE, CAPSULE = (
@@ -46,8 +47,7 @@ def _refuse(when: ArrayLike, reason: str, names: Sequence[str] = ()) -> None:
     """Raise if `when` [n] holds anywhere, and list the names of the elements for which it holds."""
     if np.any(when):
         found = [name for name, guilty in zip(names, np.ravel(when), strict=False) if guilty]
-        some = ", ".join(found[:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
-        raise UnsupportedModel(f"{reason}: {some}" if found else reason)
+        raise UnsupportedModel(f"{reason}: {listed(found, 3)}" if found else reason)
 
 
 def _check_options(model: mujoco.MjModel) -> None:

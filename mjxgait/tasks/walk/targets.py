@@ -4,12 +4,11 @@ import dataclasses
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from mjxgait.certification import CertificateConfig
 from mjxgait.config.layers import data_folder, over_base
 from mjxgait.config.schema import Config
-from mjxgait.config.tables import build, merge, read_toml
+from mjxgait.config.tables import build, merge, not_none, read_toml
 from mjxgait.controllers.key_poses.config import unhurried
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
@@ -60,7 +59,7 @@ class WalkTargets:
         Raises:
           UserError: a turn is no number.
         """
-        values: dict[str, Any] = {name: v for name, v in given.items() if v is not None}
+        values = not_none(**given)
         for name, value in values.items():
             if name not in TURNS:
                 values[name] = str(value)

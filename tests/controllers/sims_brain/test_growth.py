@@ -25,7 +25,7 @@ from mjxgait.controllers.sims_brain.reference_body import JOINTS, ROOM, grow
 from mjxgait.controllers.sims_brain.reference_files import body_xml
 from mjxgait.evolution.chance import key_of
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.spec import GraphGrowth
+from mjxgait.training.grown_spec import GraphGrowth
 
 CAPACITY, COUNT = Capacity(), 1000
 CREATE = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))

@@ -1,16 +1,17 @@
-"""`mjxgait train --runs`: several runs side by side."""
+"""Several runs of one creature side by side, from their folder to their picture."""
 
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mjxgait.errors import INTERRUPTED
-from mjxgait.experiments.multi_seed import read_seeds
+from mjxgait.api.progress import Progress, pace
+from mjxgait.experiments.multi_seed import draw_zoo, found_in, read_seeds, size, table
 from mjxgait.files import replaced
 from mjxgait.output import Output
+from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import Line, command, open_run
-from mjxgait.training.stored import disk_errors, locked
+from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
     from mjxgait.distributed.jobs import Advanced
@@ -20,11 +21,11 @@ PICTURE = "zoo.png"
 
 def evolve_zoo(
     zoo: Path,
+    output: Output,
     cluster: str | None = None,
     begin: Callable[[], object] = lambda: None,
-    quiet: bool = False,
-) -> int:
-    """Evolve or continue the runs of a folder, and show the results; return the exit code.
+) -> bool:
+    """Evolve or continue the runs of a folder; show the results; return whether they ended.
 
     cluster: address of the cluster to use instead of this machine. begin: makes the folder of new
     runs; called after the last check.
@@ -36,8 +37,7 @@ def evolve_zoo(
     from mjxgait.training.stages import prepare_devices
 
     prepare_devices(1 if cluster else None)
-    output, began = Output(quiet=quiet), time.perf_counter()
-    screen = _Screen(output)
+    began, screen = time.perf_counter(), _Screen(output)
     with interruptible() as interrupted, scheduler_at(cluster, output.progress) as scheduler:
         begin()
         with locked(zoo):
@@ -51,17 +51,16 @@ def evolve_zoo(
             ended = ended and examine(zoo, folders, again, screen.examined, told)
     if not ended:
         output.console.print(f"interrupted; go on with: {again}")
-        return INTERRUPTED
+        return False
     _leave(zoo, creature.name, folders, output)
     output.say(
         f"{time.perf_counter() - began:.0f} s; each is a run: "
         f"{command('inspect', zoo, run=folders[0])}"
     )
-    return 0
+    return True
 
 
 def _leave(zoo: Path, name: str, folders: list[Path], output: Output) -> None:
-    from mjxgait.experiments.multi_seed import draw_zoo, found_in, size, table
     from mjxgait.rendering.curves import figure
 
     found = found_in(folders)
@@ -78,25 +77,18 @@ def _leave(zoo: Path, name: str, folders: list[Path], output: Output) -> None:
         output.console.print(" ".join((f"{nearest.folder.name}:", *nearest.advice)))
 
 
-class _Screen:
-    """Progress as plain lines."""
-
-    def __init__(self, output: Output) -> None:
-        self.output = output
+class _Screen(Progress):
+    """Progress of all runs at once."""
 
     def evolved(self, generation: int, last: int, done: "Advanced | None") -> None:
         if done is None:
             self.output.say("compiling")
             return
-        left = (last - generation) * done.seconds / max(len(done.lines), 1)
         best = " ".join("-" if b is None else f"{b:.3g}" for b in _best(done.lines))
         self.output.say(
             f"generation {generation} of {last}, best fitness of each: {best}; "
-            f"{done.steps / done.seconds / 1e6:.2f} M steps/s, {left:.0f} s left"
+            f"{pace(done, last - generation)}"
         )
-
-    def examined(self, count: int, of: int) -> None:
-        self.output.say(f"examined in C MuJoCo: {count} of {of}")
 
 
 def _best(lines: Sequence[Sequence[Line]]) -> list[float | None]:

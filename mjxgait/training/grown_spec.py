@@ -1,0 +1,87 @@
+"""Simulator specification of bodies that grow from genomes (Sims)."""
+
+import dataclasses
+import functools
+from typing import Any
+
+import jax.numpy as jnp
+
+from mjxgait.config.schema import Config
+from mjxgait.controllers.sims_brain.controller import capacity_of
+from mjxgait.controllers.sims_brain.genotype import Capacity
+from mjxgait.controllers.sims_brain.operators import Genotype
+from mjxgait.controllers.sims_brain.phenotype import anatomy, body_of
+from mjxgait.controllers.sims_brain.reference_body import DRAG, FRICTION, GRAVITY, HARDEST
+from mjxgait.creature import Creature
+from mjxgait.kinds import in_water
+from mjxgait.physics.batched_trees.plant import TreePlant
+from mjxgait.physics.batched_trees.tree import Surroundings
+from mjxgait.plugins import make_controller, make_task
+from mjxgait.plugins.registry import what_ends
+from mjxgait.simulation.rollout import Simulator
+from mjxgait.tasks.starts import Starts
+from mjxgait.training.simulator import BodyParams, Growth, assembled
+
+LANES = 64
+"""Simulations of modular bodies per device."""
+
+
+@dataclasses.dataclass(frozen=True)
+class GraphGrowth(Growth[TreePlant, Genotype]):
+    """Modular bodies from graphs."""
+
+    capacity: Capacity
+
+    def body(self, plant: TreePlant, genome: Genotype, start: Starts) -> Starts:
+        """Parts without a hinge are not bent; on land bodies rest on the ground."""
+        tree = body_of(genome.graph, self.capacity).tree
+        bent = start.qpos[7:] * tree.moves[1:]
+        qpos = plant.rested(tree, jnp.concatenate([start.qpos[:7], bent]))
+        return dataclasses.replace(start, qpos=qpos, numbers=tree)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GrownSpec:
+    """Implementation of `SimulatorSpec`.
+
+    Every genome grows its own body. creature: gives settings and time step only.
+    """
+
+    creature: Creature
+    config: Config
+
+    @property
+    def numbers(self) -> None:
+        """See `SimulatorSpec`."""
+        return None
+
+    @functools.cached_property
+    def own(self) -> Simulator:
+        """See `SimulatorSpec`."""
+        return self.simulator()
+
+    def embodied(self, starts: Starts) -> Starts:
+        """See `SimulatorSpec`."""
+        return starts
+
+    def simulator(self, numbers: BodyParams | None = None) -> Simulator:
+        """See `SimulatorSpec`."""
+        config, step = self.config, float(self.creature.model.opt.timestep)
+        settings: Any = config.controller
+        capacity = capacity_of(settings)
+        body = anatomy(capacity.links)
+        ends = what_ends(self.creature, config.rollout)
+        controller = make_controller(body, step, config)
+        task = make_task(body, step, ends, config)
+        wet = in_water(config.use.task)
+        around = Surroundings(
+            step=step,
+            friction=FRICTION,
+            contact=HARDEST * step,
+            floor=not wet,
+            gravity=0.0 if wet else GRAVITY,
+            drag=DRAG if wet else 0.0,
+            lit="light" in task.adds,
+        )
+        plant, growth = TreePlant(around), GraphGrowth(capacity)
+        return assembled(body, step, plant, controller, task, config.rollout, LANES, growth)
