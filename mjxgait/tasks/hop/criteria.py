@@ -16,7 +16,12 @@ from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.starts import Starts
-from mjxgait.tasks.hop.thresholds import GoalConfig, HopConfig, LimboConfig, TravelConfig
+from mjxgait.tasks.hop.thresholds import (
+    GoalThresholds,
+    HopThresholds,
+    LimboThresholds,
+    TravelThresholds,
+)
 
 HIGHEST = 1e3
 """Height limit in standing heights: a hopping trunk may be anywhere, but no part may lie."""
@@ -38,7 +43,7 @@ class GoalCriteria(Unasked, abc.ABC):
     """Name of the share in criterion 4."""
 
     @abc.abstractmethod
-    def wanted(self, config: CertificateConfig) -> GoalConfig:
+    def wanted(self, config: CertificateConfig) -> GoalThresholds:
         """Thresholds of this task."""
 
     @abc.abstractmethod
@@ -107,7 +112,7 @@ class HopCriteria(GoalCriteria):
     share = "share that arrives and stays"
 
     @override
-    def wanted(self, config: CertificateConfig) -> HopConfig:
+    def wanted(self, config: CertificateConfig) -> HopThresholds:
         return config.hop
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
@@ -201,7 +206,7 @@ class LimboCriteria(HopCriteria):
     verdict = "it gets to its goal beneath the bar and stays"
 
     @override
-    def wanted(self, config: CertificateConfig) -> LimboConfig:
+    def wanted(self, config: CertificateConfig) -> LimboThresholds:
         return config.limbo
 
     def aimed(
@@ -267,7 +272,7 @@ class TravelCriteria(GoalCriteria):
     """A criterion for vibration was added."""
 
     @override
-    def wanted(self, config: CertificateConfig) -> TravelConfig:
+    def wanted(self, config: CertificateConfig) -> TravelThresholds:
         return config.travel
 
     @override

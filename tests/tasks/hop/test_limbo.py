@@ -32,7 +32,7 @@ from mjxgait.tasks.hop import config as evolution
 from mjxgait.tasks.hop.config import BAR_PLACE, LimboConfig, LimboWeights
 from mjxgait.tasks.hop.limbo import Goal, Limbo, bar_distance, intrusion
 from mjxgait.tasks.hop.stats import signed_weights, terms_under
-from mjxgait.tasks.hop.thresholds import LimboConfig as Demanded
+from mjxgait.tasks.hop.thresholds import LimboThresholds
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.generation import (
     LEADERS,
@@ -291,7 +291,7 @@ def test_bar_height_is_a_parameter_of_one_program(stool: Creature):
 
 
 def test_evolution_and_certification_have_the_same_bar_and_goals():
-    acceptance = Demanded()
+    acceptance = LimboThresholds()
     assert (acceptance.place, EXAMINED_RADIUS) == (BAR_PLACE, evolution.BAR_RADIUS)
     assert acceptance.height == LimboConfig().height == HEIGHT
     assert (acceptance.goals, acceptance.nominal) == (

@@ -27,7 +27,7 @@ from mjxgait.tasks.hop.config import (
     TravelConfig,
 )
 from mjxgait.tasks.hop.task import Goal, Travel
-from mjxgait.tasks.hop.thresholds import TravelConfig as Demanded
+from mjxgait.tasks.hop.thresholds import TravelThresholds
 from mjxgait.training.experiment import build_experiment
 
 CONFIG, DEMANDS = CertificateConfig(), acceptance_of("travel")
@@ -118,7 +118,7 @@ def test_evolution_and_reference_simulator_move_the_same_goals(
 
 
 def test_certification_and_evolution_have_the_same_goals():
-    acceptance = Demanded()
+    acceptance = TravelThresholds()
     assert (acceptance.goals, acceptance.nominal, travel.NEAR) == (GOALS, NOMINAL_GOAL, NEAR)
 
 
