@@ -9,8 +9,15 @@ import numpy as np
 
 from mjxgait.controllers.observations import forward_way, sideways
 from mjxgait.creature.body import Body
-from mjxgait.tasks import base as protocol
-from mjxgait.tasks.base import Reason, cost_of_transport, crossed, positive_work, ramped, touches
+from mjxgait.tasks.base import (
+    EpisodeStats,
+    Reason,
+    cost_of_transport,
+    crossed,
+    positive_work,
+    ramped,
+    touches,
+)
 from mjxgait.tasks.hop.config import NEAR, HopConfig, HopWeights, TravelConfig, TravelWeights
 from mjxgait.types import Sensed, pytree
 
@@ -19,7 +26,7 @@ SLOW, SLOW_TURN = 0.0005, 0.005
 
 
 @pytree
-class EpisodeStats(protocol.EpisodeStats):
+class HopStats(EpisodeStats):
     """Statistics over the steps of an episode until it ends.
 
     reason: a `falls.Reason`.
@@ -51,7 +58,7 @@ class EpisodeStats(protocol.EpisodeStats):
 
 
 @pytree
-class TaskParams:
+class HopParams:
     """Task parameters of an episode.
 
     rest: [] steps without motion that end an episode; never if 0.
@@ -60,13 +67,13 @@ class TaskParams:
     rest: jax.Array
 
 
-def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0) -> EpisodeStats:
+def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0) -> HopStats:
     """Return the statistics before any motion, whatever the goal.
 
     energy: whether work counts. sub_goals: their number.
     """
     none, zero, one = jnp.zeros((), jnp.int32), jnp.zeros(()), jnp.ones(())
-    return EpisodeStats(
+    return HopStats(
         steps=none,
         reason=none,
         overlap=zero,
@@ -94,14 +101,14 @@ def distance(left: jax.Array, aside: jax.Array) -> jax.Array:
     return jnp.sqrt(left * left + aside * aside)
 
 
-def away(stats: EpisodeStats) -> jax.Array:
+def away(stats: HopStats) -> jax.Array:
     """Distance [] in m from the latest position to the goal, measured in the plane."""
     return distance(stats.left, stats.aside)
 
 
 def updated(
-    creature: Body, step: float, stats: EpisodeStats, sensed: Sensed, goal: jax.Array
-) -> EpisodeStats:
+    creature: Body, step: float, stats: HopStats, sensed: Sensed, goal: jax.Array
+) -> HopStats:
     """Return the statistics after one more step. step: s. goal: [] m."""
     left = goal_distance(creature, goal, sensed)
     aside = sideways(creature, sensed)
@@ -124,8 +131,8 @@ def updated(
 
 
 def with_extras(
-    stats: EpisodeStats, sensed: Sensed, torque: jax.Array, step: float, sub_goals: Sequence[float]
-) -> EpisodeStats:
+    stats: HopStats, sensed: Sensed, torque: jax.Array, step: float, sub_goals: Sequence[float]
+) -> HopStats:
     """Add the statistics that only some settings count: work, and distances to sub-goals.
 
     torque: [J] N·m. step: s. sub_goals: [G] shares of the straight way to the goal.
@@ -146,7 +153,7 @@ def moves(sensed: Sensed) -> jax.Array:
     return (jnp.max(jnp.abs(sensed.trunk_vel)) > SLOW) | (jnp.max(jnp.abs(turning)) > SLOW_TURN)
 
 
-def rested(stats: EpisodeStats, horizon: int, rest: jax.Array, touching: jax.Array) -> EpisodeStats:
+def rested(stats: HopStats, horizon: int, rest: jax.Array, touching: jax.Array) -> HopStats:
     """Move the statistics to the end of the episode if nothing has moved for `rest` steps [].
 
     A `rest` of 0 never does. touching: [] whether a part is on the floor that must not.
@@ -183,7 +190,7 @@ def terms_under(weights: HopWeights | TravelWeights) -> tuple[str, ...]:
 
 
 def fitness_terms(
-    creature: Body, horizon: int, stats: EpisodeStats, more: Mapping[str, jax.Array] | None = None
+    creature: Body, horizon: int, stats: HopStats, more: Mapping[str, jax.Array] | None = None
 ) -> dict[str, jax.Array]:
     """Return the terms [] of one episode, each without unit and before its weight; all are >= 0.
 
@@ -203,7 +210,7 @@ def fitness_terms(
     return terms
 
 
-def style_terms(creature: Body, horizon: int, stats: EpisodeStats) -> dict[str, jax.Array]:
+def style_terms(creature: Body, horizon: int, stats: HopStats) -> dict[str, jax.Array]:
     """Style terms [] of one episode, not scaled by how near it got."""
     lived = jnp.maximum(stats.steps, 1)
     half_range = 0.5 * (creature.joints.pose_high - creature.joints.pose_low).astype(jnp.float32)

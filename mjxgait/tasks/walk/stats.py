@@ -19,8 +19,7 @@ from mjxgait.controllers.observations import (
     trunk_height,
 )
 from mjxgait.creature.body import Body
-from mjxgait.tasks import base as protocol
-from mjxgait.tasks.base import positive_work, touches
+from mjxgait.tasks.base import EpisodeStats, positive_work, touches
 from mjxgait.tasks.walk.gaits import gait_of, placed
 from mjxgait.types import Sensed, pytree
 
@@ -41,7 +40,7 @@ PER_FOOT = (
 
 
 @pytree
-class EpisodeStats(protocol.EpisodeStats):
+class WalkStats(EpisodeStats):
     """Sums over the steps of an episode until it ends. `F` counts feet here, not their geoms.
 
     reason: a `falls.Reason`.
@@ -101,21 +100,21 @@ class StatsRecorder:
     half_time: int
     contact: float = CONTACT_GAP
 
-    def init(self) -> EpisodeStats:
+    def init(self) -> WalkStats:
         """Return the empty statistics."""
         feet = len(self.creature.feet.names)
-        values = {field.name: jnp.zeros(()) for field in dataclasses.fields(EpisodeStats)}
+        values = {field.name: jnp.zeros(()) for field in dataclasses.fields(WalkStats)}
         counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason")}
         per_foot = {name: jnp.zeros(feet) for name in PER_FOOT}
-        return EpisodeStats(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
+        return WalkStats(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
 
     def update(
         self,
-        stats: EpisodeStats,
+        stats: WalkStats,
         sensed: Sensed,
         torque: jax.Array,
         clearance: jax.Array,
-    ) -> EpisodeStats:
+    ) -> WalkStats:
         """Return the statistics after one more step.
 
         Args:
@@ -143,7 +142,7 @@ class StatsRecorder:
         )
         steps = stats.steps + 1
         forward = moved @ start_forward
-        return EpisodeStats(
+        return WalkStats(
             steps=steps,
             reason=stats.reason,
             forward=forward,
@@ -216,7 +215,7 @@ def no_footfalls(feet: int) -> Footfalls:
     return Footfalls(each, each, each, each, jnp.zeros(()), each, each, each)
 
 
-def stepped(falls: Footfalls, before: EpisodeStats, after: EpisodeStats) -> Footfalls:
+def stepped(falls: Footfalls, before: WalkStats, after: WalkStats) -> Footfalls:
     """Advance by one step; the statistics before and after it show which feet landed or lifted."""
     now = after.steps.astype(jnp.float32)
     # The first stance began before the episode.
@@ -270,8 +269,8 @@ def gait_missed(
 
 
 @pytree
-class TargetStats(EpisodeStats):
-    """Extension of `EpisodeStats`.
+class TargetStats(WalkStats):
+    """Extension of `WalkStats`.
 
     falls: the footfalls.
     height, height_squared: [] m·steps, m²·steps of the trunk.
@@ -290,7 +289,7 @@ class TargetStats(EpisodeStats):
     trunk: jax.Array
 
 
-def target_stats(stats: EpisodeStats, feet: int) -> TargetStats:
+def target_stats(stats: WalkStats, feet: int) -> TargetStats:
     """Extend empty statistics by the empty ones of the targets."""
     none = jnp.zeros(())
     return TargetStats(
@@ -306,7 +305,7 @@ def target_stats(stats: EpisodeStats, feet: int) -> TargetStats:
 
 
 def target_updated(
-    creature: Body, before: TargetStats, after: EpisodeStats, sensed: Sensed
+    creature: Body, before: TargetStats, after: WalkStats, sensed: Sensed
 ) -> TargetStats:
     """Return the statistics after one more step; `after` holds those of every walk."""
     height = trunk_height(sensed)

@@ -25,9 +25,9 @@ from mjxgait.tasks.walk.fitness import (
     wished_terms,
 )
 from mjxgait.tasks.walk.stats import (
-    EpisodeStats,
     StatsRecorder,
     TargetStats,
+    WalkStats,
     along,
     target_stats,
     target_updated,
@@ -98,20 +98,20 @@ class Walk(PlainTask):
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
     @override
-    def init(self) -> EpisodeStats:
+    def init(self) -> WalkStats:
         return self._recorder.init()
 
     @override
     def update(
         self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
-    ) -> EpisodeStats:
+    ) -> WalkStats:
         return self._recorder.update(stats, sensed, torque, params)
 
     @override
     def evaluate(self, stats: Any, settings: WalkConfig) -> dict[str, jax.Array]:
         return fitness_terms(self.creature, settings, self.step, self.horizon, stats)
 
-    def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
+    def outcome(self, stats: WalkStats) -> dict[str, jax.Array]:
         """Distance in m forward and to the left, and s until the end."""
         return {
             "forward": stats.forward,

@@ -32,7 +32,7 @@ from mjxgait.tasks.hop.config import (
 from mjxgait.tasks.hop.stats import (
     STYLE,
     TERMS,
-    EpisodeStats,
+    HopStats,
     away,
     empty,
     fitness_terms,
@@ -115,7 +115,7 @@ def test_goal_distance_is_along_the_starts_forward_axis(stool: Creature):
 # The statistics
 
 
-def after(creature: Creature, moments: list[Sensed], goal: float = 1.0) -> EpisodeStats:
+def after(creature: Creature, moments: list[Sensed], goal: float = 1.0) -> HopStats:
     stats = empty(creature, HORIZON)
     for sensed in moments:
         stats = updated(creature, STEP, stats, sensed, jnp.float32(goal))
@@ -259,7 +259,7 @@ def test_every_term_has_a_nonzero_case():
     assert {name for name, value, _ in CASES if value} == set(TERMS)
 
 
-def tallied(task: Hop, moments: list[Sensed], torques: list[list[float]]) -> EpisodeStats:
+def tallied(task: Hop, moments: list[Sensed], torques: list[list[float]]) -> HopStats:
     stats = task.init()
     for sensed, torque in zip(moments, torques, strict=True):
         params = task.params(task.settings)
@@ -357,7 +357,7 @@ def experiment(stool: Creature, tmp_path_factory: pytest.TempPathFactory) -> Exp
 
 
 @pytest.fixture(scope="module")
-def evaluated(experiment: Experiment) -> tuple[EvolutionState, EpisodeStats]:
+def evaluated(experiment: Experiment) -> tuple[EvolutionState, HopStats]:
     """The first population, and the statistics [6, 3] of its trials."""
     state = experiment.init()
     return state, jax.device_get(jax.jit(experiment.simulate)(state.genomes).stats)

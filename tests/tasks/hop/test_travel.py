@@ -26,7 +26,7 @@ from mjxgait.tasks.hop.config import (
     NOMINAL_GOAL,
     TravelConfig,
 )
-from mjxgait.tasks.hop.task import Goal, Travel
+from mjxgait.tasks.hop.task import Travel, TravelGoal
 from mjxgait.tasks.hop.thresholds import TravelThresholds
 from mjxgait.training.experiment import build_experiment
 
@@ -37,8 +37,8 @@ def task(creature: Creature) -> Travel:
     return Travel(creature, STEP, HORIZON, creature.settings.termination)
 
 
-def goal_at(ahead: float, spacing: float) -> Goal:
-    return Goal(jnp.float32(ahead), jnp.float32(spacing))
+def goal_at(ahead: float, spacing: float) -> TravelGoal:
+    return TravelGoal(jnp.float32(ahead), jnp.float32(spacing))
 
 
 @pytest.mark.parametrize(
