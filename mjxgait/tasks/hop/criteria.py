@@ -7,11 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from typing_extensions import override
 
-from mjxgait.certification.acceptance import Unasked, to_the_end
+from mjxgait.certification.acceptance import WithoutTargets, to_the_end
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, at_least, at_most, parts, physics
 from mjxgait.certification.describe import vibration, worst_overlap
-from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Fall, Outcome
@@ -27,18 +26,13 @@ HIGHEST = 1e3
 """Height limit in standing heights: a hopping trunk may be anywhere, but no part may lie."""
 
 
-class GoalCriteria(Unasked, abc.ABC):
+class GoalCriteria(WithoutTargets, abc.ABC):
     """Implementation of `AcceptanceCriteria`.
 
     Pushes decide nothing: in half of a hop the body cannot react.
     """
 
-    drag: float = 0.0
-    pushed: bool = True
-    by_pushes: bool = False
-    grown: bool = False
-    leaps: bool = False
-    worth: float = 1.0
+    by_pushes = False
     share: str
     """Name of the share in criterion 4."""
 
@@ -75,16 +69,6 @@ class GoalCriteria(Unasked, abc.ABC):
             physics(whole, config.physics),
             parts(whole, config.parts),
         )
-
-    def kept(
-        self, champion: Champion, whole: Recording, config: CertificateConfig
-    ) -> tuple[Criterion, ...]:
-        """Return no criteria: evolution has promised nothing."""
-        return ()
-
-    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Keep the goals."""
-        return goal
 
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
