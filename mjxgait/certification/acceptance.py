@@ -8,7 +8,15 @@ import numpy as np
 
 from mjxgait.certification import criteria
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.criteria import Criterion, at_most, parts, physics, speed, upright
+from mjxgait.certification.criteria import (
+    Criterion,
+    at_most,
+    failures,
+    parts,
+    physics,
+    speed,
+    upright,
+)
 from mjxgait.certification.describe import worst_overlap
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -240,8 +248,7 @@ class PlainCriteria(StaysUp):
     ) -> tuple[Criterion, ...]:
         """Stays up, at half the time step too; physics, parts, and its own."""
         window = whole.window(config.warmup)
-        repeated = self._basic(halved, config)
-        failed = sum(not m.passed for c in repeated for m in c.measures)
+        failed = failures(*self._basic(halved, config))
         return (
             *self._basic(whole, config),
             Criterion(

@@ -69,6 +69,11 @@ class Criterion:
         return min((m.margin for m in self.measures), default=-np.inf)
 
 
+def failures(*criteria: Criterion) -> int:
+    """Number of measures that do not pass."""
+    return sum(not measure.passed for one in criteria for measure in one.measures)
+
+
 def at_least(name: str, value: float, threshold: float, best: float | None = None) -> Measure:
     """Measure that should be large.
 
@@ -79,10 +84,12 @@ def at_least(name: str, value: float, threshold: float, best: float | None = Non
     )
 
 
-def steady(first: float, second: float, least: float) -> Measure:
+def steady(
+    first: float, second: float, least: float, name: str = "second half / first half"
+) -> Measure:
     """Measure of the second half of a motion over the first."""
     share = second / first if first > 0 else np.nan
-    return at_least("second half / first half", share, least, 1.0)
+    return at_least(name, share, least, 1.0)
 
 
 def at_most(name: str, value: float, threshold: float) -> Measure:

@@ -16,6 +16,7 @@ from mjxgait.certification.criteria import (
     Measure,
     at_least,
     at_most,
+    failures,
     joint_overrun,
     steady,
 )
@@ -101,11 +102,10 @@ class ModularCriteria(StaysUp, abc.ABC):
         """Evaluate criteria 2, 6, 8, 9, and the task's own."""
         window, other = whole.window(config.warmup), halved.window(config.warmup)
         does, repeated = (self.second(each, config) for each in (window, other))
-        failed = sum(not m.passed for m in repeated.measures)
         done, halved_done = self.done(window), self.done(other)
         change = abs(halved_done / done - 1) if done else np.inf
         halves = (
-            at_most("failures in 2", failed, 0.0),
+            at_most("failures in 2", failures(repeated), 0.0),
             at_most("change", change, config.half_step.distance),
         )
         wanted = self.wanted(config)
