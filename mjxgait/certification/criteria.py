@@ -194,9 +194,9 @@ def distance(window: Recording) -> float:
     return float(window.trunk_pos[-1, 0] - window.trunk_pos[0, 0])
 
 
-def ratio(part: float, distance: float) -> float:
+def ratio(part: float, way: float) -> float:
     """Ratio of a nuisance to the forward distance; NaN without one."""
-    return part / distance if distance > 0 else np.nan
+    return part / way if way > 0 else np.nan
 
 
 LEFT = 0.05

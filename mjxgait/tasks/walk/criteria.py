@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from typing_extensions import override
 
-from mjxgait.certification.acceptance import StaysUp, to_the_end
+from mjxgait.certification.acceptance import StaysUp, Wish, to_the_end
 from mjxgait.certification.config import (
     CertificateConfig,
     GaitConfig,
@@ -51,7 +51,6 @@ from mjxgait.reference.measure import (
 from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.tasks.walk.gaits import gait_of, transition
 from mjxgait.tasks.walk.target_criteria import (
-    Wish,
     as_asked,
     commanded_heading,
     draw_commands,
@@ -164,7 +163,7 @@ def lean(window: Recording, config: Fall) -> Measure:
 def progress(window: Recording, config: ProgressConfig) -> Criterion:
     """2. All strides lead forward, fast enough, straight, without slowing down."""
     path, starts = window.trunk_pos, stride_starts(window)
-    distance, middle = path[-1, 0] - path[0, 0], len(path) // 2
+    middle = len(path) // 2
     first, second = path[middle, 0] - path[0, 0], path[-1, 0] - path[middle, 0]
     advance = np.diff(path[starts, 0]) if len(starts) > 1 else np.array([np.nan])
     sideways = np.abs(path[:, 1] - path[0, 1]).max()
@@ -181,7 +180,7 @@ def progress(window: Recording, config: ProgressConfig) -> Criterion:
                 speed(window) / window.dimensions.body_length,
                 config.speed,
             ),
-            at_most("drift / distance", ratio(sideways, distance), config.drift),
+            at_most("drift / distance", ratio(sideways, distance(window)), config.drift),
             at_most("off straight ahead (deg)", heading_off(window), config.heading),
             steady(first, second, config.second_half),
         ),
