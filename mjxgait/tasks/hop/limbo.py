@@ -23,7 +23,8 @@ from mjxgait.tasks.hop.config import (
     LIMBO_NOMINAL_GOAL,
     LimboConfig,
 )
-from mjxgait.tasks.hop.stats import MISSED, HopParams, HopStats, fitness_terms
+from mjxgait.tasks.hop.fitness import MISSED, fitness_terms
+from mjxgait.tasks.hop.stats import HopParams, HopStats
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed, pytree

@@ -13,18 +13,20 @@ from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
 from mjxgait.tasks.base import touches
 from mjxgait.tasks.hop.config import GOALS, NEAR, NOMINAL_GOAL, GoalConfig, HopConfig, TravelConfig
-from mjxgait.tasks.hop.stats import (
+from mjxgait.tasks.hop.fitness import (
     GOAL,
+    fitness_terms,
+    signed_weights,
+    style_terms,
+    terms_under,
+)
+from mjxgait.tasks.hop.stats import (
     HopParams,
     HopStats,
     away,
     empty,
-    fitness_terms,
     goal_distance,
     rested,
-    signed_weights,
-    style_terms,
-    terms_under,
     updated,
     with_extras,
 )

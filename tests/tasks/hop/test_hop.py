@@ -29,19 +29,8 @@ from mjxgait.tasks.hop.config import (
     HopConfig,
     HopWeights,
 )
-from mjxgait.tasks.hop.stats import (
-    STYLE,
-    TERMS,
-    HopStats,
-    away,
-    empty,
-    fitness_terms,
-    goal_distance,
-    rested,
-    signed_weights,
-    terms_under,
-    updated,
-)
+from mjxgait.tasks.hop.fitness import STYLE, TERMS, fitness_terms, signed_weights, terms_under
+from mjxgait.tasks.hop.stats import HopStats, away, empty, goal_distance, rested, updated
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.starts import Starts, draw_starts
 from mjxgait.tasks.walk.config import WalkConfig

@@ -30,8 +30,8 @@ from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.starts import nominal_starts, perturbed_starts
 from mjxgait.tasks.hop import config as evolution
 from mjxgait.tasks.hop.config import BAR_PLACE, LimboConfig, LimboWeights
+from mjxgait.tasks.hop.fitness import signed_weights, terms_under
 from mjxgait.tasks.hop.limbo import Limbo, LimboGoal, bar_distance, intrusion
-from mjxgait.tasks.hop.stats import signed_weights, terms_under
 from mjxgait.tasks.hop.thresholds import LimboThresholds
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.generation import (
