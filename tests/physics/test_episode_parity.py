@@ -36,7 +36,7 @@ from mjxgait.controllers.key_poses.controller import TUNING as GENES
 from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.creature import Creature
 from mjxgait.reference.outcome import Outcome
-from mjxgait.tasks.base import Reason
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import NEVER, Starts
 from mjxgait.tasks.walk.stats import WalkStats
 from mjxgait.training.experiment import build_experiment

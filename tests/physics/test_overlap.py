@@ -27,7 +27,8 @@ from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
-from mjxgait.tasks.base import DEEP, TOUCHING, Reason
+from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.terms import DEEP, TOUCHING
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import fitness_terms
 from mjxgait.tasks.walk.stats import StatsRecorder, WalkStats

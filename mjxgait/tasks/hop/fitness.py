@@ -7,9 +7,10 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.creature.body import Body
-from mjxgait.tasks.base import Reason, cost_of_transport, crossed, ramped
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.config import NEAR, HopConfig, HopWeights, TravelConfig, TravelWeights
 from mjxgait.tasks.hop.stats import HopStats, away
+from mjxgait.tasks.terms import cost_of_transport, crossed, ramped
 
 TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
 GOAL = "distance"

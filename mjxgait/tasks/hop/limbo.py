@@ -15,7 +15,6 @@ from mjxgait.creature import Creature
 from mjxgait.creature.body import Body
 from mjxgait.creature.ground.spec import parse_ground
 from mjxgait.errors import UserError
-from mjxgait.tasks.base import ramped
 from mjxgait.tasks.hop.config import (
     BAR_PLACE,
     BAR_RADIUS,
@@ -27,6 +26,7 @@ from mjxgait.tasks.hop.fitness import MISSED, fitness_terms
 from mjxgait.tasks.hop.stats import HopParams, HopStats
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.starts import Starts
+from mjxgait.tasks.terms import ramped
 from mjxgait.types import Sensed, pytree
 
 SLOPES = np.tan(np.radians(np.arange(-80, 81, 10))).astype(np.float32)[:, None]

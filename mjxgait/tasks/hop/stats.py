@@ -9,8 +9,10 @@ import numpy as np
 
 from mjxgait.controllers.observations import forward_way, sideways
 from mjxgait.creature.body import Body
-from mjxgait.tasks.base import EpisodeStats, positive_work, touches
+from mjxgait.tasks.base import EpisodeStats
+from mjxgait.tasks.falls import touches
 from mjxgait.tasks.hop.config import NEAR
+from mjxgait.tasks.terms import positive_work
 from mjxgait.types import Sensed, pytree
 
 SLOW, SLOW_TURN = 0.0005, 0.005

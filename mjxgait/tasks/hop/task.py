@@ -11,7 +11,7 @@ from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.tasks.base import touches
+from mjxgait.tasks.falls import touches
 from mjxgait.tasks.hop.config import GOALS, NEAR, NOMINAL_GOAL, GoalConfig, HopConfig, TravelConfig
 from mjxgait.tasks.hop.fitness import (
     GOAL,

@@ -19,7 +19,8 @@ from typing_extensions import override
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.physics.batched_trees.tree import ModularSensed
-from mjxgait.tasks.base import FINISHED, EpisodeStats, ramp
+from mjxgait.tasks.base import EpisodeStats
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.modular.config import (
     BlocksConfig,
     JumpConfig,
@@ -31,6 +32,7 @@ from mjxgait.tasks.modular.config import (
 )
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.starts import NEVER, Starts, half_widths
+from mjxgait.tasks.terms import ramp
 from mjxgait.types import Sensed, pytree
 
 WILD = 1
@@ -92,7 +94,7 @@ class BlocksTask(PlainTask):
     def ended(self, sensed: Sensed, goal: object) -> jax.Array:
         speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
         wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
-        return jnp.where(wild | (own(sensed).limit_excess > FURTHEST), WILD, FINISHED)
+        return jnp.where(wild | (own(sensed).limit_excess > FURTHEST), WILD, Reason.FINISHED)
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
         """The first term is a reward, all others are penalties.

@@ -11,7 +11,8 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.creature.body import Body
-from mjxgait.tasks.base import Reason, cost_of_transport, crossed, ramped
+from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.terms import cost_of_transport, crossed, ramped
 from mjxgait.tasks.walk.config import LIKENESS, TargetConfig, WalkConfig, Weights
 from mjxgait.tasks.walk.gaits import GRAVITY, animal_duty, animal_stride, most_strides, stride_limit
 from mjxgait.tasks.walk.stats import TargetStats, WalkStats, gait_missed

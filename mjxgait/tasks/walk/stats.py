@@ -19,7 +19,9 @@ from mjxgait.controllers.observations import (
     trunk_height,
 )
 from mjxgait.creature.body import Body
-from mjxgait.tasks.base import EpisodeStats, positive_work, touches
+from mjxgait.tasks.base import EpisodeStats
+from mjxgait.tasks.falls import touches
+from mjxgait.tasks.terms import positive_work
 from mjxgait.tasks.walk.gaits import gait_of, placed
 from mjxgait.types import Sensed, pytree
 

@@ -13,9 +13,9 @@ from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.tasks.base import hardness
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.starts import Starts, draw_starts, milder
+from mjxgait.tasks.terms import hardness
 from mjxgait.tasks.walk.config import TargetConfig, WalkConfig
 from mjxgait.tasks.walk.fitness import (
     fitness_terms,

@@ -22,7 +22,7 @@ from mjxgait.plugins import resolve_config
 from mjxgait.plugins.registry import build_config
 from mjxgait.plugins.user_code import load
 from mjxgait.reference.starts import nominal_starts
-from mjxgait.tasks.base import Reason
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.config import (
     GOALS,
     NOMINAL_GOAL,

@@ -21,7 +21,7 @@ from disturbed_walks import (
 from recorded_stats import Frames, end, stats_of
 
 from mjxgait.creature import Creature
-from mjxgait.tasks.base import Reason, why_fallen
+from mjxgait.tasks.falls import Reason, why_fallen
 from mjxgait.tasks.walk.stats import (
     CONTACT_GAP,
     StatsRecorder,

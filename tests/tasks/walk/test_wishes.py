@@ -25,7 +25,8 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.plugins import resolve_config
 from mjxgait.plugins.fit import check_fit
-from mjxgait.tasks.base import in_order, score
+from mjxgait.tasks.base import in_order
+from mjxgait.tasks.terms import score
 from mjxgait.tasks.walk.config import TargetWeights, WalkConfig, Weights
 from mjxgait.tasks.walk.fitness import REWARDS, TERMS, terms_under
 from mjxgait.tasks.walk.gaits import (
