@@ -15,7 +15,8 @@ from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.terms import cost_of_transport, crossed, ramped
 from mjxgait.tasks.walk.config import LIKENESS, TargetConfig, WalkConfig, Weights
 from mjxgait.tasks.walk.gaits import GRAVITY, animal_duty, animal_stride, most_strides, stride_limit
-from mjxgait.tasks.walk.stats import TargetStats, WalkStats, gait_missed
+from mjxgait.tasks.walk.stats import WalkStats
+from mjxgait.tasks.walk.target_stats import TargetStats, gait_missed
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")

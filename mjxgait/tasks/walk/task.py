@@ -24,10 +24,9 @@ from mjxgait.tasks.walk.fitness import (
     terms_under,
     wished_terms,
 )
-from mjxgait.tasks.walk.stats import (
-    StatsRecorder,
+from mjxgait.tasks.walk.stats import StatsRecorder, WalkStats
+from mjxgait.tasks.walk.target_stats import (
     TargetStats,
-    WalkStats,
     along,
     target_stats,
     target_updated,

@@ -22,14 +22,8 @@ from recorded_stats import Frames, end, stats_of
 
 from mjxgait.creature import Creature
 from mjxgait.tasks.falls import Reason, why_fallen
-from mjxgait.tasks.walk.stats import (
-    CONTACT_GAP,
-    StatsRecorder,
-    TargetStats,
-    WalkStats,
-    target_stats,
-    target_updated,
-)
+from mjxgait.tasks.walk.stats import CONTACT_GAP, StatsRecorder, WalkStats
+from mjxgait.tasks.walk.target_stats import TargetStats, target_stats, target_updated
 from mjxgait.types import Sensed
 
 

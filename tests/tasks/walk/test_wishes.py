@@ -36,7 +36,8 @@ from mjxgait.tasks.walk.gaits import (
     placed,
     stations_of,
 )
-from mjxgait.tasks.walk.stats import Footfalls, WalkStats, gait_missed, no_footfalls, stepped
+from mjxgait.tasks.walk.stats import WalkStats
+from mjxgait.tasks.walk.target_stats import Footfalls, gait_missed, no_footfalls, stepped
 from mjxgait.tasks.walk.targets import (
     WalkTargets,
     configured,
