@@ -110,59 +110,71 @@ class StatsRecorder:
         Args:
           torque: [J] N·m. clearance: [] m, wanted in each swing of each foot.
         """
-        creature = self.creature
-        start_forward, start_left = creature.frame.start_axes
-        moved = sensed.trunk_pos - creature.frame.stand_pos.astype(np.float32)
-        forward_axis = sensed.trunk_rot @ creature.frame.forward.astype(np.float32)
-        up = (sensed.trunk_rot @ creature.frame.up.astype(np.float32))[2]
-        low, pos = self._feet(sensed)
+        joints = self.creature.joints
+        outside = (sensed.joint_pos < joints.pose_low.astype(np.float32)) | (
+            sensed.joint_pos > joints.pose_high.astype(np.float32)
+        )
+        most = self.creature.gains.torque_limit.astype(np.float32)
+        return WalkStats(
+            steps=stats.steps + 1,
+            reason=stats.reason,
+            overlap=stats.overlap,
+            touch=stats.touch + touches(self.creature, sensed),
+            work=stats.work + positive_work(torque, sensed, self.step),
+            saturation=stats.saturation + jnp.mean(jnp.abs(torque) >= most),
+            limits=stats.limits + jnp.mean(outside),
+            **self._trunk(stats, sensed),
+            **self._feet(stats, sensed, clearance),
+        )
+
+    def _trunk(self, stats: WalkStats, sensed: Sensed) -> dict[str, jax.Array]:
+        """Statistics of the trunk after one more step, by name."""
+        frame = self.creature.frame
+        start_forward, start_left = frame.start_axes
+        moved = sensed.trunk_pos - frame.stand_pos.astype(np.float32)
+        forward_axis = sensed.trunk_rot @ frame.forward.astype(np.float32)
+        up = (sensed.trunk_rot @ frame.up.astype(np.float32))[2]
+        forward = moved @ start_forward
+        early = stats.steps + 1 <= self.half_time
+        return {
+            "forward": forward,
+            "left": moved @ start_left,
+            "forward_half": jnp.where(early, forward, stats.forward_half),
+            "heading": jnp.arctan2(forward_axis @ start_left, forward_axis @ start_forward),
+            "tilt": stats.tilt + 1.0 - up,
+            "wobble": stats.wobble + sensed.trunk_angvel @ sensed.trunk_angvel,
+        }
+
+    def _feet(self, stats: WalkStats, sensed: Sensed, clearance: jax.Array) -> dict[str, jax.Array]:
+        """Statistics of the feet after one more step, by name."""
+        low, pos = self._places(sensed)
         down = (low < self.contact).astype(jnp.float32)
         # A foot that bears weight penetrates the floor a little.
         loaded = (low < 0.0).astype(jnp.float32)
         peak = jnp.maximum(stats.peak, low)
         missing = jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0)
         went = jnp.linalg.norm(pos - stats.foot_pos, axis=1)
-        slid = went * down * stats.foot_down
         speed = jnp.where(stats.steps > 0, jnp.max(went) / self.step, 0.0)
-        rise = SWING * creature.frame.hip_height
+        rise = SWING * self.creature.frame.hip_height
         swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, stats.swinging))
         fallen = jnp.maximum(stats.swinging - swinging, 0.0)
-        outside = (sensed.joint_pos < creature.joints.pose_low.astype(np.float32)) | (
-            sensed.joint_pos > creature.joints.pose_high.astype(np.float32)
-        )
-        steps = stats.steps + 1
-        forward = moved @ start_forward
-        return WalkStats(
-            steps=steps,
-            reason=stats.reason,
-            forward=forward,
-            left=moved @ start_left,
-            forward_half=jnp.where(steps <= self.half_time, forward, stats.forward_half),
-            heading=jnp.arctan2(forward_axis @ start_left, forward_axis @ start_forward),
-            swings=stats.swings + fallen,
-            swinging=swinging,
-            shortfall=stats.shortfall + fallen * missing,
-            peak=jnp.where(fallen > 0, low, peak),
-            loaded=loaded,
-            touchdowns=stats.touchdowns + loaded * (1.0 - stats.loaded),
-            contact=stats.contact + down,
-            slip=stats.slip + slid,
-            airborne=stats.airborne + (jnp.max(down) == 0.0),
-            foot_height=stats.foot_height + jnp.mean(low),
-            foot_speed=jnp.maximum(stats.foot_speed, speed),
-            foot_pos=pos,
-            foot_down=down,
-            tilt=stats.tilt + 1.0 - up,
-            wobble=stats.wobble + sensed.trunk_angvel @ sensed.trunk_angvel,
-            touch=stats.touch + touches(creature, sensed),
-            work=stats.work + positive_work(torque, sensed, self.step),
-            saturation=stats.saturation
-            + jnp.mean(jnp.abs(torque) >= creature.gains.torque_limit.astype(np.float32)),
-            limits=stats.limits + jnp.mean(outside),
-            overlap=stats.overlap,
-        )
+        return {
+            "swings": stats.swings + fallen,
+            "swinging": swinging,
+            "shortfall": stats.shortfall + fallen * missing,
+            "peak": jnp.where(fallen > 0, low, peak),
+            "loaded": loaded,
+            "touchdowns": stats.touchdowns + loaded * (1.0 - stats.loaded),
+            "contact": stats.contact + down,
+            "slip": stats.slip + went * down * stats.foot_down,
+            "airborne": stats.airborne + (jnp.max(down) == 0.0),
+            "foot_height": stats.foot_height + jnp.mean(low),
+            "foot_speed": jnp.maximum(stats.foot_speed, speed),
+            "foot_pos": pos,
+            "foot_down": down,
+        }
 
-    def _feet(self, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
+    def _places(self, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
         """Lowest point [F] of each foot and its horizontal position [F, 2], mean of its geoms."""
         low = foot_heights(self.creature, sensed)
         pos = jnp.stack(
