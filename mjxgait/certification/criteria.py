@@ -84,9 +84,7 @@ def at_least(name: str, value: float, threshold: float, best: float | None = Non
     )
 
 
-def steady(
-    first: float, second: float, least: float, name: str = "second half / first half"
-) -> Measure:
+def steady(name: str, first: float, second: float, least: float) -> Measure:
     """Measure of the second half of a motion over the first."""
     share = second / first if first > 0 else np.nan
     return at_least(name, share, least, 1.0)

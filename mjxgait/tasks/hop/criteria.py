@@ -288,7 +288,7 @@ class TravelCriteria(GoalCriteria):
             "travels",
             (
                 at_least("speed (m/s)", way[-1] / seconds, wanted.speed),
-                steady(first, second, wanted.second_half, "second half's speed / first"),
+                steady("second half's speed / first", first, second, wanted.second_half),
             ),
         )
 

@@ -199,7 +199,7 @@ def gets_on(name: str, middle: np.ndarray, time_step: float, config: GoingThresh
         (
             at_least("speed (m/s)", float(flight(middle, time_step)), config.speed),
             at_least("way / path", straight, config.straight, 1.0),
-            steady(first, second, config.second_half),
+            steady("second half / first half", first, second, config.second_half),
         ),
     )
 

@@ -43,7 +43,7 @@ class TurnCriteria(PlainCriteria):
                 "turns",
                 (
                     at_least("turn (deg/s)", (turned[-1] - turned[0]) / seconds, RATE),
-                    steady(first, second, HALF, "second half's turn / first"),
+                    steady("second half's turn / first", first, second, HALF),
                 ),
             ),
             Criterion(

@@ -182,7 +182,7 @@ def progress(window: Recording, config: ProgressConfig) -> Criterion:
             ),
             at_most("drift / distance", ratio(sideways, distance(window)), config.drift),
             at_most("off straight ahead (deg)", heading_off(window), config.heading),
-            steady(first, second, config.second_half),
+            steady("second half / first half", first, second, config.second_half),
         ),
     )
 
