@@ -13,7 +13,7 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.reference import starts as examined
 from mjxgait.reference.outcome import Fall, Outcome
-from mjxgait.tasks.walk.stats import EpisodeStats
+from mjxgait.tasks.walk.stats import WalkStats
 
 STEP, SECONDS = 0.005, 1.2
 STEPS = round(SECONDS / STEP)
@@ -167,7 +167,7 @@ UNCOMPARED = {
     "overlap": "looked at every 16 steps only; tests/physics/test_overlap.py holds it against C"
 }
 """Fields of the statistics without a counterpart in `recorded_stats`, with the reason."""
-FIELDS = [field.name for field in dataclasses.fields(EpisodeStats) if field.name not in UNCOMPARED]
+FIELDS = [field.name for field in dataclasses.fields(WalkStats) if field.name not in UNCOMPARED]
 
 
 def tolerance(name: str, value: np.ndarray | float) -> float:

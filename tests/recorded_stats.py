@@ -6,7 +6,7 @@ import numpy as np
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.reference.outcome import Fall, Trajectory
-from mjxgait.tasks.base import Reason
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.walk.stats import CONTACT_GAP, SWING
 
 

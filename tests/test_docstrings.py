@@ -18,8 +18,6 @@ TABLES = {"controller", "fitness"}
 """Tables of settings whose class depends on the controller or the task."""
 OTHERS = {"gymnasium", "jax", "logging", "mujoco", "optax"}
 """Packages whose names are not looked up."""
-PENDING = {"falls.Reason", "Plant.parameters"}
-"""Known wrong, in files that are being restructured: `base.Reason`, `ModelPlant.parameters`."""
 
 
 def described(docstring: str) -> Iterator[str]:
@@ -158,4 +156,4 @@ def test_dotted_names_exist(path: Path):
     texts = strings(ast.parse(path.read_text(encoding="utf-8")))
     dotted = {one for text in texts for one in DOTTED.findall(text)}
     dotted = {one for one in dotted if one.split(".")[-1] not in FILES}
-    assert not {one for one in dotted - PENDING if not names().exist(one)}
+    assert not {one for one in dotted if not names().exist(one)}

@@ -8,7 +8,15 @@ import numpy as np
 
 from mjxgait.certification import criteria
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.criteria import Criterion, at_most, parts, physics, speed, upright
+from mjxgait.certification.criteria import (
+    Criterion,
+    at_most,
+    failures,
+    parts,
+    physics,
+    speed,
+    upright,
+)
 from mjxgait.certification.describe import worst_overlap
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -135,13 +143,19 @@ def promising(
     return bool(acceptance.managed(outcome, seconds, creature).mean() >= acceptance.worth)
 
 
-class Unasked:
-    """Implementation of `AcceptanceCriteria`: for a task without targets.
+class WithoutTargets:
+    """Implementation of `AcceptanceCriteria`: for a task without targets, on land, with fixed goals.
 
-    revision: see `AcceptanceCriteria`.
+    drag, pushed, by_pushes, grown, leaps, revision, worth: see `AcceptanceCriteria`.
     """
 
+    drag: float = 0.0
+    pushed: bool = True
+    by_pushes: bool = True
+    grown: bool = False
+    leaps: bool = False
     revision: int = 0
+    worth: float = 1.0
 
     def with_targets(self, wish: Wish) -> Any:
         """Return these criteria: targets add none."""
@@ -163,25 +177,26 @@ class Unasked:
         """Return no criteria: nothing was commanded."""
         return ()
 
+    def kept(
+        self, champion: Champion, whole: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """Return no criteria: evolution has promised nothing."""
+        return ()
+
+    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """Keep the goals."""
+        return goal
+
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
         """Mask of the simulations that are down."""
         return ~outcome.stayed_up
 
 
-class StaysUp(Unasked):
+class StaysUp(WithoutTargets):
     """Implementation of `AcceptanceCriteria`.
 
     Criteria 4 and 5 for tasks with no goal but to be up at the end.
-
-    drag, pushed, by_pushes, grown, leaps, worth: see `AcceptanceCriteria`.
     """
-
-    drag: float = 0.0
-    pushed: bool = True
-    by_pushes: bool = True
-    grown: bool = False
-    leaps: bool = False
-    worth: float = 1.0
 
     def fall(self, config: CertificateConfig) -> Fall:
         """Return the conditions of criterion 1."""
@@ -192,16 +207,6 @@ class StaysUp(Unasked):
     ) -> Starts:
         """Return the starts unchanged."""
         return starts
-
-    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Keep the goals."""
-        return goal
-
-    def kept(
-        self, champion: Champion, whole: Recording, config: CertificateConfig
-    ) -> tuple[Criterion, ...]:
-        """Return no criteria: evolution has promised nothing."""
-        return ()
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
         """Mask of the simulations that stayed up."""
@@ -243,8 +248,7 @@ class PlainCriteria(StaysUp):
     ) -> tuple[Criterion, ...]:
         """Stays up, at half the time step too; physics, parts, and its own."""
         window = whole.window(config.warmup)
-        repeated = self._basic(halved, config)
-        failed = sum(not m.passed for c in repeated for m in c.measures)
+        failed = failures(*self._basic(halved, config))
         return (
             *self._basic(whole, config),
             Criterion(

@@ -14,12 +14,12 @@ from mjxgait.config.tables import (
     Whole,
 )
 from mjxgait.reference.outcome import Fall
-from mjxgait.tasks.hop.thresholds import HopConfig, LimboConfig, TravelConfig
+from mjxgait.tasks.hop.thresholds import HopThresholds, LimboThresholds, TravelThresholds
 from mjxgait.tasks.modular.thresholds import (
-    FollowConfig,
-    JumpConfig,
-    RoamConfig,
-    SwimConfig,
+    FollowThresholds,
+    JumpThresholds,
+    RoamThresholds,
+    SwimThresholds,
 )
 
 
@@ -221,13 +221,13 @@ class CertificateConfig:
     physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
     parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
     wishes: TargetsConfig = dataclasses.field(default_factory=TargetsConfig)
-    hop: HopConfig = dataclasses.field(default_factory=HopConfig)
-    limbo: LimboConfig = dataclasses.field(default_factory=LimboConfig)
-    travel: TravelConfig = dataclasses.field(default_factory=TravelConfig)
-    swim: SwimConfig = dataclasses.field(default_factory=SwimConfig)
-    roam: RoamConfig = dataclasses.field(default_factory=RoamConfig)
-    jump: JumpConfig = dataclasses.field(default_factory=JumpConfig)
-    follow: FollowConfig = dataclasses.field(default_factory=FollowConfig)
+    hop: HopThresholds = dataclasses.field(default_factory=HopThresholds)
+    limbo: LimboThresholds = dataclasses.field(default_factory=LimboThresholds)
+    travel: TravelThresholds = dataclasses.field(default_factory=TravelThresholds)
+    swim: SwimThresholds = dataclasses.field(default_factory=SwimThresholds)
+    roam: RoamThresholds = dataclasses.field(default_factory=RoamThresholds)
+    jump: JumpThresholds = dataclasses.field(default_factory=JumpThresholds)
+    follow: FollowThresholds = dataclasses.field(default_factory=FollowThresholds)
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:

@@ -69,6 +69,11 @@ class Criterion:
         return min((m.margin for m in self.measures), default=-np.inf)
 
 
+def failures(*criteria: Criterion) -> int:
+    """Number of measures that do not pass."""
+    return sum(not measure.passed for one in criteria for measure in one.measures)
+
+
 def at_least(name: str, value: float, threshold: float, best: float | None = None) -> Measure:
     """Measure that should be large.
 
@@ -79,10 +84,10 @@ def at_least(name: str, value: float, threshold: float, best: float | None = Non
     )
 
 
-def steady(first: float, second: float, least: float) -> Measure:
+def steady(name: str, first: float, second: float, least: float) -> Measure:
     """Measure of the second half of a motion over the first."""
     share = second / first if first > 0 else np.nan
-    return at_least("second half / first half", share, least, 1.0)
+    return at_least(name, share, least, 1.0)
 
 
 def at_most(name: str, value: float, threshold: float) -> Measure:
@@ -187,9 +192,9 @@ def distance(window: Recording) -> float:
     return float(window.trunk_pos[-1, 0] - window.trunk_pos[0, 0])
 
 
-def ratio(part: float, distance: float) -> float:
+def ratio(part: float, way: float) -> float:
     """Ratio of a nuisance to the forward distance; NaN without one."""
-    return part / distance if distance > 0 else np.nan
+    return part / way if way > 0 else np.nan
 
 
 LEFT = 0.05

@@ -41,15 +41,15 @@ def buzz(window: Recording) -> float:
     The vibration is the largest speed of any joint within any band of 2 Hz, from 20 Hz on, or
     from `MULTIPLE` times the transition frequency if that is higher.
     """
-    speed, step = window.joint_vel, window.time_step
-    if not np.isfinite(speed).all() or not speed.any():
+    velocity, step = window.joint_vel, window.time_step
+    if not np.isfinite(velocity).all() or not velocity.any():
         return np.nan
-    power, spacing = _power(speed, step), 1 / (len(speed) * step)
+    power, spacing = _power(velocity), 1 / (len(velocity) * step)
     first = int(np.ceil(max(SLOWEST, MULTIPLE * transition(window.dimensions.mass)) / spacing))
     sums = np.cumsum(np.pad(power, ((1, 0), (0, 0))), axis=0)[first:]
     width = max(round(BAND / spacing), 1)
     bands = sums[width:] - sums[:-width]
-    return float(np.sqrt(bands.max(initial=0.0) / (speed**2).mean(0).mean()))
+    return float(np.sqrt(bands.max(initial=0.0) / (velocity**2).mean(0).mean()))
 
 
 def vibration(window: Recording, config: GaitConfig) -> Measure:
@@ -57,12 +57,12 @@ def vibration(window: Recording, config: GaitConfig) -> Measure:
     return at_most("buzz of a joint / joint speed", buzz(window), config.buzz)
 
 
-def _power(speed: np.ndarray, step: float) -> np.ndarray:
+def _power(velocity: np.ndarray) -> np.ndarray:
     """Power [F, J] in (rad/s)² at each frequency from 0 on; its sum is a joint's mean square."""
-    taper = np.hanning(len(speed))[:, None]
-    waves: np.ndarray = np.abs(np.fft.rfft(speed * taper, axis=0)) ** 2
+    taper = np.hanning(len(velocity))[:, None]
+    waves: np.ndarray = np.abs(np.fft.rfft(velocity * taper, axis=0)) ** 2
     total = waves.sum(0)
-    scale = (speed**2).mean(0) / np.where(total > 0, total, 1.0)
+    scale = (velocity**2).mean(0) / np.where(total > 0, total, 1.0)
     return waves * scale
 
 

@@ -201,6 +201,8 @@ def _sentence(cls: type, problem: "ErrorDetails") -> str:
             return f'the key "{key}" is missing'
         case "value_error":
             return f"{key}: {problem['ctx']['error']}" if key else str(problem["ctx"]["error"])
+        case "dataclass_type":
+            return f"{key} = {reprlib.repr(problem['input'])}: input should be a table"
         case _:
             return f"{key} = {reprlib.repr(problem['input'])}: {problem['msg'].lower()}"
 

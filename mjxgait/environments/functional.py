@@ -47,7 +47,7 @@ class State:
 
     obs: [O]. reward: [] of the latest step. done: [] 1 once the episode has ended, else 0. metrics:
     [] each; `fitness` of the episode so far, its terms and outcomes. info: `reason` [] of the end
-    (`tasks.base.Reason`, 0 for none), `time_out` [] 1 if time was up; other entries are kept.
+    (`tasks.falls.Reason`, 0 for none), `time_out` [] 1 if time was up; other entries are kept.
     """
 
     data: Data

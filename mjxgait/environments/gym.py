@@ -25,7 +25,7 @@ from mjxgait.reference.starts import nominal_starts
 from mjxgait.reference.state import Drive
 from mjxgait.reference.stepping import examined_model
 from mjxgait.simulation.rollout import CHECK_EVERY
-from mjxgait.tasks.base import FINISHED
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed
 
@@ -183,7 +183,7 @@ class CreatureEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Advance by one control step; see `gymnasium.Env`.
 
-        The last info of an episode has its metrics, and `reason`, a `tasks.base.Reason`.
+        The last info of an episode has its metrics, and `reason`, a `tasks.falls.Reason`.
         """
         target = self.problem.targets(np.asarray(action))
         simulation, before = self._simulation, self._sensed
@@ -199,5 +199,5 @@ class CreatureEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if verdict.done:
             info = {name: float(value) for name, value in verdict.metrics.items()}
             info["reason"] = reason
-        over = reason != FINISHED, bool(verdict.time_out)
+        over = reason != Reason.FINISHED, bool(verdict.time_out)
         return np.asarray(verdict.obs), float(verdict.reward), *over, info

@@ -23,7 +23,8 @@ from mjxgait.plugins import make_task
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import what_ends
 from mjxgait.simulation.rollout import CHECK_EVERY, deepened, is_going, reason_of
-from mjxgait.tasks.base import FINISHED, EpisodeStats, Task, in_order
+from mjxgait.tasks.base import EpisodeStats, Task, in_order
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed, choose, pytree
 
@@ -69,7 +70,7 @@ class Progress:
 class Verdict:
     """What an agent gets after a step.
 
-    obs: [O]. reward: []. reason: [] why the episode ended, a `tasks.base.Reason`. done: [] 1 after
+    obs: [O]. reward: []. reason: [] why the episode ended, a `tasks.falls.Reason`. done: [] 1 after
     its end. time_out: [] 1 if it ended because its time was up. metrics: [] each, by name.
     """
 
@@ -176,7 +177,7 @@ class Problem:
         The reward is the change of the fitness, so rewards add up to the fitness of the episode.
         """
         stats, terms = after.stats, self._terms(after.stats)
-        fell = stats.reason != FINISHED
+        fell = stats.reason != Reason.FINISHED
         late = ~fell & (stats.steps >= self.horizon)
         named = {f"term_{name}": jnp.float32(value) for name, value in terms.items()}
         named |= {

@@ -10,7 +10,8 @@ import jax.numpy as jnp
 
 from mjxgait.config.schema import Config
 from mjxgait.simulation.rollout import Episodes, Simulator
-from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, in_order
+from mjxgait.tasks.base import EpisodeStats, in_order
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Evaluation, RequestedTrials, choose
 
@@ -71,9 +72,9 @@ class Local:
 
         terms = each(partial(task.evaluate, settings=settings.fitness), task.terms)
         return Evaluation(
-            terms=jnp.where((stats.reason == NONFINITE)[..., None], jnp.nan, terms),
+            terms=jnp.where((stats.reason == Reason.NONFINITE)[..., None], jnp.nan, terms),
             outcome=each(task.outcome, task.outcomes),
-            failed=stats.reason != FINISHED,
+            failed=stats.reason != Reason.FINISHED,
             sim_steps=jnp.sum(stats.steps),
             computed_steps=episodes.computed_steps,
         )

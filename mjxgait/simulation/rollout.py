@@ -21,7 +21,8 @@ from mjxgait.controllers.base import Controller
 from mjxgait.controllers.observations import sense
 from mjxgait.controllers.spd import Drive, Function, Rules, per_lane
 from mjxgait.creature.body import Body
-from mjxgait.tasks.base import FINISHED, NONFINITE, EpisodeStats, Task
+from mjxgait.tasks.base import EpisodeStats, Task
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import BodyState, Plant, Sensed, choose, pytree
 
@@ -187,7 +188,7 @@ class Simulator:
             lane, results, taken, rounds = carry
             lane = jax.lax.fori_loop(0, CHECK_EVERY, self._step, lane)
             lane = self._look_for_overlap(lane)
-            done = (lane.stats.steps >= self.steps) | (lane.stats.reason != FINISHED)
+            done = (lane.stats.steps >= self.steps) | (lane.stats.reason != Reason.FINISHED)
             results = store(results, jnp.where(done, lane.job, queue), lane.stats)
             lane = self._per_lane(choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
             return lane, results, taken + jnp.sum(done), rounds + 1
@@ -297,7 +298,7 @@ class Simulator:
         return dataclasses.replace(lane, stats=deepened(lane.stats, depth, self.steps))
 
     def reason(self, sensed: Sensed, goal: object) -> jax.Array:
-        """Return why [] an episode ends now; `FINISHED` while it goes on."""
+        """Return why [] an episode ends now; `Reason.FINISHED` while it goes on."""
         return reason_of(self.task, sensed, goal)
 
     def _evaluate(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
@@ -306,7 +307,7 @@ class Simulator:
         reason = self.reason(sensed, lane.goal)
         updated = self.task.update(stats, sensed, torque, lane.params, lane.goal)
         kept = dataclasses.replace(stats, reason=jnp.where(going, reason, stats.reason))
-        return choose(going & (reason == FINISHED), updated, kept)
+        return choose(going & (reason == Reason.FINISHED), updated, kept)
 
     def _per_lane(self, function: Function) -> Function:
         return per_lane(self.plant, function)
@@ -327,16 +328,16 @@ def first_body(start: Starts) -> BodyState:
 
 
 def reason_of(task: Task, sensed: Sensed, goal: object) -> jax.Array:
-    """Return why [] a task's episode ends now; `FINISHED` while it goes on."""
+    """Return why [] a task's episode ends now; `Reason.FINISHED` while it goes on."""
     ended = task.ended(sensed, goal)
     seen = (sensed.joint_vel, sensed.trunk_pos, sensed.trunk_rot, sensed.bias)
     finite = jnp.isfinite(sum(jnp.sum(part) for part in seen))
-    return jnp.where(finite, ended, NONFINITE).astype(jnp.int32)
+    return jnp.where(finite, ended, Reason.NONFINITE).astype(jnp.int32)
 
 
 def is_going(stats: EpisodeStats, steps: int) -> jax.Array:
     """Return whether [] an episode of so many steps has not ended."""
-    return (stats.reason == FINISHED) & (stats.steps < steps)
+    return (stats.reason == Reason.FINISHED) & (stats.steps < steps)
 
 
 def deepened(stats: EpisodeStats, depth: jax.Array, steps: int) -> EpisodeStats:

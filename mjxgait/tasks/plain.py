@@ -13,7 +13,8 @@ from mjxgait.config.tables import NoSettings
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.tasks.base import EpisodeStats, why_fallen
+from mjxgait.tasks.base import EpisodeStats
+from mjxgait.tasks.falls import why_fallen
 from mjxgait.tasks.starts import Starts, draw_starts
 from mjxgait.types import Sensed
 

@@ -23,8 +23,9 @@ from mjxgait.evolution.state import (
 )
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Simulator
-from mjxgait.tasks.base import Task, in_order, score
+from mjxgait.tasks.base import Task, in_order
 from mjxgait.tasks.starts import Starts
+from mjxgait.tasks.terms import score
 from mjxgait.training.simulator import BodyParams, SimulatorSpec
 from mjxgait.types import Evaluation, RequestedTrials, choose, pytree
 

@@ -32,7 +32,7 @@ class Growth(Protocol[PlantOf_contra, Genome_contra]):
 
 @pytree
 class BodyParams:
-    """All body parameters that the program reads. plant: see `Plant.parameters`."""
+    """All body parameters that the program reads. plant: see `ModelPlant.parameters`."""
 
     body: GivenBody
     ends: Ends

@@ -16,7 +16,8 @@ from mjxgait.environments.functional import make_environment
 from mjxgait.environments.problem import make_problem
 from mjxgait.evolution.chance import key_of
 from mjxgait.simulation.evaluator import Local
-from mjxgait.tasks.base import in_order, score
+from mjxgait.tasks.base import in_order
+from mjxgait.tasks.terms import score
 from mjxgait.training.experiment import build_experiment
 
 TOLERANCE = 1e-3

@@ -21,7 +21,7 @@ from mjxgait.plugins.registry import config_class
 from mjxgait.tasks.walk.targets import WalkTargets
 
 PACKAGE = Path(__file__).parents[2] / "mjxgait"
-MAKERS = {"at_least", "at_most", "Measure"}
+MAKERS = {"at_least", "at_most", "steady", "Measure"}
 GOALS, MODULAR = ("hop", "limbo", "travel"), tuple(k.name for k in tasks().values() if k.modular)
 OF_FOLDER = {"walk": ("walk",), "hop": GOALS, "modular": MODULAR, "turn": ("turn",)}
 """Tasks of the criteria in each folder; those in `certification` are of all."""

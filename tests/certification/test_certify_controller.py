@@ -302,7 +302,7 @@ def test_observations_added_by_tasks_equal_those_of_evolution(tiny):
     import jax.numpy as jnp
 
     from mjxgait.kinds import tasks
-    from mjxgait.tasks.hop.limbo import Goal
+    from mjxgait.tasks.hop.limbo import LimboGoal
 
     state, sensed = askew(tiny)
     state = dataclasses.replace(state, goal=np.array([0.8]), bar=np.array([0.6]))
@@ -312,7 +312,9 @@ def test_observations_added_by_tasks_equal_those_of_evolution(tiny):
             continue
         task = kind.part("task")(tiny, STEP, 1000, tiny.settings.termination)
         # A goal 0.8 m ahead, and a bar at its final height.
-        given = Goal(jnp.float32(0.8), jnp.float32(0.0)) if name == "limbo" else jnp.float32(0.8)
+        given = (
+            LimboGoal(jnp.float32(0.8), jnp.float32(0.0)) if name == "limbo" else jnp.float32(0.8)
+        )
         goal = task.goal(SimpleNamespace(goal=given))
         found |= task.observations(goal, sensed)
         assert set(task.adds) <= set(found)

@@ -28,7 +28,7 @@ from mjxgait.reference.starts import (
 from mjxgait.tasks.hop import config as evolution
 from mjxgait.tasks.hop.criteria import HopCriteria
 from mjxgait.tasks.hop.task import Hop
-from mjxgait.tasks.hop.thresholds import HopConfig
+from mjxgait.tasks.hop.thresholds import HopThresholds
 
 CONFIG, DEMANDS = CertificateConfig(), HopCriteria()
 FRAMES, STEP, GOAL = 4400, 0.005, 1.2
@@ -337,7 +337,7 @@ def test_an_existing_goal_is_kept(tiny: Creature):
 
 
 def test_certificate_and_evolution_use_the_same_goals():
-    acceptance = HopConfig()
+    acceptance = HopThresholds()
     assert (acceptance.goals, acceptance.nominal) == (evolution.GOALS, evolution.NOMINAL_GOAL)
     assert acceptance.near == evolution.NEAR
 

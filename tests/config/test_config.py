@@ -58,7 +58,7 @@ def test_a_config_survives_its_own_file(tmp_path: Path):
         ({"rollout": {"seconds": float("nan")}}, "rollout.seconds"),
         ({"controller": {"tuning": {"threshold": [0.2, 0.1]}}}, "the first must not be the larger"),
         ({"seed": "x"}, "seed = 'x'"),
-        ({"controller": 3}, "controller"),
+        ({"controller": 3}, "controller = 3: input should be a table"),
     ],
 )
 def test_a_mistake_is_named_with_its_place(table: dict, words: str):

@@ -19,8 +19,10 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
 from mjxgait.simulation.evaluator import Local
-from mjxgait.tasks.base import FINISHED, in_order, score
+from mjxgait.tasks.base import in_order
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import Starts
+from mjxgait.tasks.terms import score
 from mjxgait.training.experiment import Experiment, build_experiment
 
 COUNT = 7
@@ -111,7 +113,7 @@ def test_an_episode_ends_with_the_tasks_own_end_or_its_time(played_and_evaluated
     states, judged, _ = played_and_evaluated
     failed = judged.failed.T.reshape(-1)
     assert (states.done[:, -1] == 1).all()
-    assert ((states.info["reason"][:, -1] != FINISHED) == failed).all()
+    assert ((states.info["reason"][:, -1] != Reason.FINISHED) == failed).all()
     assert (states.info["time_out"][:, -1] == ~failed).all()
     for done, reward in zip(states.done, states.reward, strict=True):
         end = int(np.argmax(done))

@@ -7,7 +7,7 @@ from helpers import weight_vector
 from mjxgait.controllers.key_poses.controller import TUNING, Genome
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.state import EvolutionState, Origin
-from mjxgait.tasks.base import score
+from mjxgait.tasks.terms import score
 from mjxgait.tasks.walk.fitness import terms_under
 from mjxgait.tasks.walk.task import Walk
 

@@ -16,7 +16,7 @@ from mjxgait.creature import Creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
 from mjxgait.simulation.rollout import Lane, Simulator
-from mjxgait.tasks.walk.stats import EpisodeStats
+from mjxgait.tasks.walk.stats import WalkStats
 from mjxgait.training.experiment import build_experiment
 
 BODIES = (1.0, 0.6, 1.7)
@@ -46,7 +46,7 @@ pytestmark = pytest.mark.thorough(
 @pytest.fixture(scope="module", params=["auto", "mjx"])
 def statistics(
     request: pytest.FixtureRequest, stool: Creature
-) -> tuple[EpisodeStats, list[EpisodeStats]]:
+) -> tuple[WalkStats, list[WalkStats]]:
     """Statistics of three starts with three bodies together, and of all starts with each body."""
     settings = {"physics": request.param, "lanes": 2, "starts": len(BODIES), "terminate": False}
     experiment = build_experiment(stool, small_config(rollout=settings))
@@ -63,15 +63,15 @@ def statistics(
         ),
     )
 
-    def mixed(numbers: Any, genomes: Genome, *rest: Any) -> EpisodeStats:
+    def mixed(numbers: Any, genomes: Genome, *rest: Any) -> WalkStats:
         fields = {f.name: getattr(simulator, f.name) for f in dataclasses.fields(Simulator)}
         return BodyPerStart(**fields, numbers=numbers).simulate(genomes, *rest).stats
 
-    def one(numbers: Any, genomes: Genome, *rest: Any) -> EpisodeStats:
+    def one(numbers: Any, genomes: Genome, *rest: Any) -> WalkStats:
         own = dataclasses.replace(simulator, plant=plant.with_parameters(numbers))
         return own.simulate(genomes, *rest).stats
 
-    def run(function: Any, *numbers: Any) -> list[EpisodeStats]:
+    def run(function: Any, *numbers: Any) -> list[WalkStats]:
         numbers = jax.tree.map(jnp.float32, numbers)
         lowered = jax.jit(function).lower(numbers[0], *arguments)
         program = lowered.compile(compiler_options=SLIM)
@@ -83,14 +83,14 @@ def statistics(
     return together, run(one, *numbers) if request.param == "mjx" else alone
 
 
-def test_every_episode_keeps_its_own_body(statistics: tuple[EpisodeStats, list[EpisodeStats]]):
+def test_every_episode_keeps_its_own_body(statistics: tuple[WalkStats, list[WalkStats]]):
     together, alone = statistics
     for start, theirs in enumerate(alone):
         ours = together.forward[0, :, start]
         np.testing.assert_allclose(ours, theirs.forward[0, :, start], atol=1e-4)
 
 
-def test_different_bodies_walk_differently(statistics: tuple[EpisodeStats, list[EpisodeStats]]):
+def test_different_bodies_walk_differently(statistics: tuple[WalkStats, list[WalkStats]]):
     _, (own, light, heavy) = statistics
     for other in (light, heavy):
         assert np.abs(own.forward - other.forward).max() > 1e-3

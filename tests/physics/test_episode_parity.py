@@ -36,9 +36,9 @@ from mjxgait.controllers.key_poses.controller import TUNING as GENES
 from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.creature import Creature
 from mjxgait.reference.outcome import Outcome
-from mjxgait.tasks.base import Reason
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import NEVER, Starts
-from mjxgait.tasks.walk.stats import EpisodeStats
+from mjxgait.tasks.walk.stats import WalkStats
 from mjxgait.training.experiment import build_experiment
 
 SLIM = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": True}
@@ -87,7 +87,7 @@ MJX = pytest.mark.thorough("test_ground_parity.py compares the fast step with MJ
 )
 def statistics(
     request: pytest.FixtureRequest, body: Creature, outcomes: list[Outcome]
-) -> EpisodeStats:
+) -> WalkStats:
     """Statistics of evolution, leaves [B, 1, R, ...]."""
     rollout = {"seconds": SECONDS, "lanes": 3, "physics": request.param, **LENIENT}
     simulator = build_experiment(body, small_config(rollout=rollout)).simulator
@@ -121,15 +121,13 @@ def expected(
 def test_every_statistic_is_compared(expected: dict):
     for name in FIELDS:
         assert all(name in stats for stats in expected.values()), (
-            f"EpisodeStats.{name} is compared with nothing: work it out in recorded_stats.py, or say in "
+            f"WalkStats.{name} is compared with nothing: work it out in recorded_stats.py, or say in "
             f"UNCOMPARED why not"
         )
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_statistics_match_the_reference_simulator(
-    statistics: EpisodeStats, expected: dict, name: str
-):
+def test_statistics_match_the_reference_simulator(statistics: WalkStats, expected: dict, name: str):
     rows = dict(
         zip(EPISODES, np.reshape(getattr(statistics, name), (len(EPISODES), -1)), strict=True)
     )
@@ -165,7 +163,7 @@ def test_every_setting_changes_the_motion(expected: dict, settings: str):
 
 
 def test_a_fall_ends_the_episode_at_the_reference_simulators_time(
-    outcomes: list[Outcome], statistics: EpisodeStats
+    outcomes: list[Outcome], statistics: WalkStats
 ):
     """Reasons are compared above; the reference simulator dates a fall by the end of its step."""
     knocked = list(DISTURBANCES).index("knocked over")

@@ -27,10 +27,11 @@ from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
-from mjxgait.tasks.base import DEEP, TOUCHING, Reason
+from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.terms import DEEP, TOUCHING
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import fitness_terms
-from mjxgait.tasks.walk.stats import EpisodeStats, StatsRecorder
+from mjxgait.tasks.walk.stats import StatsRecorder, WalkStats
 from mjxgait.types import BodyState
 
 LANES = 6
@@ -291,7 +292,7 @@ def test_statistics_keep_the_deepest_counted_overlap(stool: Creature):
     np.testing.assert_allclose(found.overlap, [0.03, 0.04, 0.0, 0.0, 0.01])
 
 
-def term(creature: Creature, stats: EpisodeStats, forward: float) -> float:
+def term(creature: Creature, stats: WalkStats, forward: float) -> float:
     config = WalkConfig(speed=1.0)
     stats = dataclasses.replace(
         stats, forward=jnp.float32(forward * creature.frame.body_length), steps=jnp.int32(200)

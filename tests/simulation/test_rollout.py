@@ -22,8 +22,10 @@ from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Episodes
-from mjxgait.tasks.base import Reason, in_order, score
+from mjxgait.tasks.base import in_order
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import NEVER, Starts, draw_starts
+from mjxgait.tasks.terms import score
 from mjxgait.tasks.walk.fitness import (
     BEYOND,
     REWARDS,

@@ -20,7 +20,7 @@ OnTheWay = Annotated[float, pydantic.Field(gt=0, lt=1)]
 class HopWeights:
     """Weight of each fitness term; all are penalties.
 
-    mjxgait/tasks/hop/stats.py has the exact definitions. As long as the style terms, all but
+    mjxgait/tasks/hop/fitness.py has the exact definitions. As long as the style terms, all but
     `distance` and `missed`, sum up to less than `distance`, getting nearer pays despite its style.
 
     Attributes:

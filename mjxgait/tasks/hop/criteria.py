@@ -7,38 +7,45 @@ from collections.abc import Mapping
 import numpy as np
 from typing_extensions import override
 
-from mjxgait.certification.acceptance import Unasked, to_the_end
+from mjxgait.certification.acceptance import WithoutTargets, to_the_end
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.criteria import Criterion, at_least, at_most, parts, physics
+from mjxgait.certification.criteria import (
+    Criterion,
+    at_least,
+    at_most,
+    failures,
+    parts,
+    physics,
+    steady,
+)
 from mjxgait.certification.describe import vibration, worst_overlap
-from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.starts import Starts
-from mjxgait.tasks.hop.thresholds import GoalConfig, HopConfig, LimboConfig, TravelConfig
+from mjxgait.tasks.hop.thresholds import (
+    GoalThresholds,
+    HopThresholds,
+    LimboThresholds,
+    TravelThresholds,
+)
 
 HIGHEST = 1e3
 """Height limit in standing heights: a hopping trunk may be anywhere, but no part may lie."""
 
 
-class GoalCriteria(Unasked, abc.ABC):
+class GoalCriteria(WithoutTargets, abc.ABC):
     """Implementation of `AcceptanceCriteria`.
 
     Pushes decide nothing: in half of a hop the body cannot react.
     """
 
-    drag: float = 0.0
-    pushed: bool = True
-    by_pushes: bool = False
-    grown: bool = False
-    leaps: bool = False
-    worth: float = 1.0
+    by_pushes = False
     share: str
     """Name of the share in criterion 4."""
 
     @abc.abstractmethod
-    def wanted(self, config: CertificateConfig) -> GoalConfig:
+    def wanted(self, config: CertificateConfig) -> GoalThresholds:
         """Thresholds of this task."""
 
     @abc.abstractmethod
@@ -62,24 +69,14 @@ class GoalCriteria(Unasked, abc.ABC):
     ) -> tuple[Criterion, ...]:
         """Evaluate criteria 1 and 2, both at half the time step too, 8, 9; without a warm-up."""
         basic, repeated = (self.basic(each, config) for each in (whole, halved))
-        failed = sum(not m.passed for c in repeated for m in c.measures)
         of = " and ".join(str(c.number) for c in basic)
+        failed = at_most(f"failures in {of}", failures(*repeated), 0.0)
         return (
             *basic,
-            Criterion(6, "half the time step", (at_most(f"failures in {of}", failed, 0.0),)),
+            Criterion(6, "half the time step", (failed,)),
             physics(whole, config.physics),
             parts(whole, config.parts),
         )
-
-    def kept(
-        self, champion: Champion, whole: Recording, config: CertificateConfig
-    ) -> tuple[Criterion, ...]:
-        """Return no criteria: evolution has promised nothing."""
-        return ()
-
-    def next_goal(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Keep the goals."""
-        return goal
 
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
@@ -107,7 +104,7 @@ class HopCriteria(GoalCriteria):
     share = "share that arrives and stays"
 
     @override
-    def wanted(self, config: CertificateConfig) -> HopConfig:
+    def wanted(self, config: CertificateConfig) -> HopThresholds:
         return config.hop
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
@@ -201,7 +198,7 @@ class LimboCriteria(HopCriteria):
     verdict = "it gets to its goal beneath the bar and stays"
 
     @override
-    def wanted(self, config: CertificateConfig) -> LimboConfig:
+    def wanted(self, config: CertificateConfig) -> LimboThresholds:
         return config.limbo
 
     def aimed(
@@ -267,7 +264,7 @@ class TravelCriteria(GoalCriteria):
     """A criterion for vibration was added."""
 
     @override
-    def wanted(self, config: CertificateConfig) -> TravelConfig:
+    def wanted(self, config: CertificateConfig) -> TravelThresholds:
         return config.travel
 
     @override
@@ -285,13 +282,13 @@ class TravelCriteria(GoalCriteria):
         wanted = config.travel
         way = whole.trunk_pos[:, 0]
         half, seconds = len(way) // 2, len(way) * whole.time_step
-        kept = (way[-1] - way[half]) / way[half] if way[half] > 0 else np.nan
+        first, second = way[half], way[-1] - way[half]
         return Criterion(
             2,
             "travels",
             (
                 at_least("speed (m/s)", way[-1] / seconds, wanted.speed),
-                at_least("second half's speed / first", kept, wanted.second_half, 1.0),
+                steady("second half's speed / first", first, second, wanted.second_half),
             ),
         )
 

@@ -15,8 +15,6 @@ from mjxgait.creature import Creature
 from mjxgait.creature.body import Body
 from mjxgait.creature.ground.spec import parse_ground
 from mjxgait.errors import UserError
-from mjxgait.tasks.base import ramped
-from mjxgait.tasks.hop import stats as hop
 from mjxgait.tasks.hop.config import (
     BAR_PLACE,
     BAR_RADIUS,
@@ -24,9 +22,11 @@ from mjxgait.tasks.hop.config import (
     LIMBO_NOMINAL_GOAL,
     LimboConfig,
 )
-from mjxgait.tasks.hop.stats import MISSED, fitness_terms
+from mjxgait.tasks.hop.fitness import MISSED, fitness_terms
+from mjxgait.tasks.hop.stats import HopParams, HopStats
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.starts import Starts
+from mjxgait.tasks.terms import ramped
 from mjxgait.types import Sensed, pytree
 
 SLOPES = np.tan(np.radians(np.arange(-80, 81, 10))).astype(np.float32)[:, None]
@@ -64,7 +64,7 @@ THERE, BENEATH = 0.6, 0.05
 
 
 @pytree
-class Goal:
+class LimboGoal:
     """Goal and bar of one trial.
 
     ahead: [] m from the start to the goal. raised: [] m by which the bar is above its final height.
@@ -75,8 +75,8 @@ class Goal:
 
 
 @pytree
-class EpisodeStats(hop.EpisodeStats):
-    """Extension of `hop.EpisodeStats`.
+class LimboStats(HopStats):
+    """Extension of `HopStats`.
 
     bar: [] m, greatest depth in the bar at its final height.
     raised: [] m of it that cost nothing yet.
@@ -89,8 +89,8 @@ class EpisodeStats(hop.EpisodeStats):
 
 
 @pytree
-class TaskParams(hop.TaskParams):
-    """Extension of `hop.TaskParams`. height: [] m, of the bar."""
+class LimboParams(HopParams):
+    """Extension of `HopParams`. height: [] m, of the bar."""
 
     height: jax.Array
 
@@ -113,7 +113,7 @@ class Limbo(Hop):
         if not parse_ground(settings.ground).flat:
             raise UserError(f"rollout.ground = {settings.ground}: task limbo needs flat ground")
         starts = super().trials(key, creature, settings)
-        return dataclasses.replace(starts, goal=Goal(starts.goal, jnp.zeros(settings.starts)))
+        return dataclasses.replace(starts, goal=LimboGoal(starts.goal, jnp.zeros(settings.starts)))
 
     @override
     def levels(self, settings: LimboConfig) -> jax.Array | int:
@@ -124,7 +124,7 @@ class Limbo(Hop):
         """The bar comes down, so that hoppers learn to duck little by little."""
         left = 1.0 - ramped(settings.lowering, level)
         raised = jnp.full(trials.friction.shape, settings.higher * left)
-        return dataclasses.replace(trials, goal=Goal(trials.goal.ahead, raised))
+        return dataclasses.replace(trials, goal=LimboGoal(trials.goal.ahead, raised))
 
     def level_passed(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """At the goal in the end, and hardly in the bar."""
@@ -135,9 +135,9 @@ class Limbo(Hop):
         return jax.tree.map(jnp.asarray, trial.goal)
 
     @override
-    def params(self, settings: Any) -> TaskParams:
+    def params(self, settings: Any) -> LimboParams:
         height = jnp.asarray(settings.height, jnp.float32)
-        return TaskParams(**vars(super().params(settings)), height=height)
+        return LimboParams(**vars(super().params(settings)), height=height)
 
     @override
     def observations(self, goal: Any, sensed: Sensed) -> dict[str, jax.Array]:
@@ -146,9 +146,9 @@ class Limbo(Hop):
         }
 
     @override
-    def init(self) -> EpisodeStats:
+    def init(self) -> LimboStats:
         none = jnp.zeros(())
-        return EpisodeStats(**vars(super().init()), bar=none, raised=none, height=none)
+        return LimboStats(**vars(super().init()), bar=none, raised=none, height=none)
 
     @override
     def update(self, stats: Any, sensed: Sensed, torque: jax.Array, params: Any, goal: Any) -> Any:

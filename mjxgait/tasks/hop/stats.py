@@ -1,7 +1,7 @@
 """Episode statistics of the tasks with a goal, updated once per step for one creature."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -9,9 +9,10 @@ import numpy as np
 
 from mjxgait.controllers.observations import forward_way, sideways
 from mjxgait.creature.body import Body
-from mjxgait.tasks import base as protocol
-from mjxgait.tasks.base import Reason, cost_of_transport, crossed, positive_work, ramped, touches
-from mjxgait.tasks.hop.config import NEAR, HopConfig, HopWeights, TravelConfig, TravelWeights
+from mjxgait.tasks.base import EpisodeStats
+from mjxgait.tasks.falls import touches
+from mjxgait.tasks.hop.config import NEAR
+from mjxgait.tasks.terms import positive_work
 from mjxgait.types import Sensed, pytree
 
 SLOW, SLOW_TURN = 0.0005, 0.005
@@ -19,7 +20,7 @@ SLOW, SLOW_TURN = 0.0005, 0.005
 
 
 @pytree
-class EpisodeStats(protocol.EpisodeStats):
+class HopStats(EpisodeStats):
     """Statistics over the steps of an episode until it ends.
 
     reason: a `falls.Reason`.
@@ -51,7 +52,7 @@ class EpisodeStats(protocol.EpisodeStats):
 
 
 @pytree
-class TaskParams:
+class HopParams:
     """Task parameters of an episode.
 
     rest: [] steps without motion that end an episode; never if 0.
@@ -60,13 +61,13 @@ class TaskParams:
     rest: jax.Array
 
 
-def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0) -> EpisodeStats:
+def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0) -> HopStats:
     """Return the statistics before any motion, whatever the goal.
 
     energy: whether work counts. sub_goals: their number.
     """
     none, zero, one = jnp.zeros((), jnp.int32), jnp.zeros(()), jnp.ones(())
-    return EpisodeStats(
+    return HopStats(
         steps=none,
         reason=none,
         overlap=zero,
@@ -94,14 +95,14 @@ def distance(left: jax.Array, aside: jax.Array) -> jax.Array:
     return jnp.sqrt(left * left + aside * aside)
 
 
-def away(stats: EpisodeStats) -> jax.Array:
+def away(stats: HopStats) -> jax.Array:
     """Distance [] in m from the latest position to the goal, measured in the plane."""
     return distance(stats.left, stats.aside)
 
 
 def updated(
-    creature: Body, step: float, stats: EpisodeStats, sensed: Sensed, goal: jax.Array
-) -> EpisodeStats:
+    creature: Body, step: float, stats: HopStats, sensed: Sensed, goal: jax.Array
+) -> HopStats:
     """Return the statistics after one more step. step: s. goal: [] m."""
     left = goal_distance(creature, goal, sensed)
     aside = sideways(creature, sensed)
@@ -124,8 +125,8 @@ def updated(
 
 
 def with_extras(
-    stats: EpisodeStats, sensed: Sensed, torque: jax.Array, step: float, sub_goals: Sequence[float]
-) -> EpisodeStats:
+    stats: HopStats, sensed: Sensed, torque: jax.Array, step: float, sub_goals: Sequence[float]
+) -> HopStats:
     """Add the statistics that only some settings count: work, and distances to sub-goals.
 
     torque: [J] N·m. step: s. sub_goals: [G] shares of the straight way to the goal.
@@ -146,7 +147,7 @@ def moves(sensed: Sensed) -> jax.Array:
     return (jnp.max(jnp.abs(sensed.trunk_vel)) > SLOW) | (jnp.max(jnp.abs(turning)) > SLOW_TURN)
 
 
-def rested(stats: EpisodeStats, horizon: int, rest: jax.Array, touching: jax.Array) -> EpisodeStats:
+def rested(stats: HopStats, horizon: int, rest: jax.Array, touching: jax.Array) -> HopStats:
     """Move the statistics to the end of the episode if nothing has moved for `rest` steps [].
 
     A `rest` of 0 never does. touching: [] whether a part is on the floor that must not.
@@ -156,78 +157,3 @@ def rested(stats: EpisodeStats, horizon: int, rest: jax.Array, touching: jax.Arr
     return dataclasses.replace(
         stats, steps=stats.steps + left, ground=stats.ground + left * touching
     )
-
-
-TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
-GOAL = "distance"
-MISSED = "missed"
-AIM = (GOAL, MISSED)
-"""Terms that count from the first generation on."""
-STYLE = tuple(name for name in TERMS if name not in AIM)
-"""Style terms, ramped in over the generations."""
-OPTIONAL = ("energy", "sub_goals")
-"""Terms that exist only with a weight."""
-
-FARTHEST = 2.0
-"""Cap on the distance that is left, in goal distances."""
-SHORTEST = 0.25
-"""Smallest distance by which work is divided, in body lengths."""
-FASTEST, FAST = 20.0, 0.7
-"""Joint speed in rad/s that no machine reaches, and the share of it that is free."""
-
-
-def terms_under(weights: HopWeights | TravelWeights) -> tuple[str, ...]:
-    """Names of the terms that these weights enable."""
-    names = tuple(field.name for field in dataclasses.fields(weights))
-    return tuple(n for n in names if n not in OPTIONAL or getattr(weights, n))
-
-
-def fitness_terms(
-    creature: Body, horizon: int, stats: EpisodeStats, more: Mapping[str, jax.Array] | None = None
-) -> dict[str, jax.Array]:
-    """Return the terms [] of one episode, each without unit and before its weight; all are >= 0.
-
-    Style counts in proportion to how near the episode got: attempts to learn hopping must not be
-    punished. Sub-goals count in full, because standing still passes none.
-
-    Args:
-      horizon: T, steps of a full episode. more: style that another task adds.
-    """
-    left = away(stats) / stats.goal
-    near = jnp.clip(1.0 - left, 0.0, 1.0)
-    style = style_terms(creature, horizon, stats) | dict(more or {})
-    terms = {GOAL: jnp.minimum(left, FARTHEST), MISSED: jnp.minimum(left / NEAR, 1.0)}
-    terms |= {name: near * value for name, value in style.items()}
-    if stats.closest is not None:
-        terms["sub_goals"] = jnp.mean(jnp.minimum(stats.closest / stats.goal, 1.0))
-    return terms
-
-
-def style_terms(creature: Body, horizon: int, stats: EpisodeStats) -> dict[str, jax.Array]:
-    """Style terms [] of one episode, not scaled by how near it got."""
-    lived = jnp.maximum(stats.steps, 1)
-    half_range = 0.5 * (creature.joints.pose_high - creature.joints.pose_low).astype(jnp.float32)
-    terms = {
-        "time": stats.arrived / horizon,
-        "restless": jnp.minimum(stats.after / stats.goal, 1.0),
-        "ground": stats.ground / lived,
-        "fall": jnp.where(stats.reason == Reason.FINISHED, 0.0, 1.0),
-        "fast": jnp.clip(stats.fastest / FASTEST - FAST, 0.0, 1.0 - FAST) / (1.0 - FAST),
-        "neutral": jnp.minimum(jnp.mean(stats.bent / jnp.maximum(half_range, 1e-6)), 1.0),
-        "overlap": crossed(creature, stats.overlap),
-    }
-    if stats.work is not None:
-        way = jnp.maximum(stats.goal - stats.left, SHORTEST * creature.frame.body_length)
-        terms["energy"] = cost_of_transport(creature, stats.work, way)
-    return terms
-
-
-def signed_weights(config: HopConfig | TravelConfig, generation: jax.Array) -> dict[str, jax.Array]:
-    """Signed weight [] of each term at a generation []: all negative, style terms ramped in."""
-    ramp = ramped(config.style_ramp, generation)
-
-    def weight(name: str) -> jax.Array:
-        signed = -jnp.float32(getattr(config.weights, name))
-        return signed if name in AIM else signed * ramp
-
-    return {name: weight(name) for name in terms_under(config.weights)}

@@ -11,21 +11,22 @@ from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.tasks.base import touches
-from mjxgait.tasks.hop import stats as hop
+from mjxgait.tasks.falls import touches
 from mjxgait.tasks.hop.config import GOALS, NEAR, NOMINAL_GOAL, GoalConfig, HopConfig, TravelConfig
-from mjxgait.tasks.hop.stats import (
+from mjxgait.tasks.hop.fitness import (
     GOAL,
-    EpisodeStats,
-    TaskParams,
-    away,
-    empty,
     fitness_terms,
-    goal_distance,
-    rested,
     signed_weights,
     style_terms,
     terms_under,
+)
+from mjxgait.tasks.hop.stats import (
+    HopParams,
+    HopStats,
+    away,
+    empty,
+    goal_distance,
+    rested,
     updated,
     with_extras,
 )
@@ -85,36 +86,36 @@ class Hop(PlainTask):
         return jnp.asarray(trial.goal)
 
     @override
-    def params(self, settings: GoalConfig) -> TaskParams:
-        return TaskParams(jnp.round(settings.rest / self.step))
+    def params(self, settings: GoalConfig) -> HopParams:
+        return HopParams(jnp.round(settings.rest / self.step))
 
     @override
     def observations(self, goal: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
         return {"goal_distance": goal_distance(self.creature, goal, sensed)}
 
     @override
-    def init(self) -> EpisodeStats:
+    def init(self) -> HopStats:
         energy = "energy" in self.terms
         return empty(self.creature, self.horizon, energy, len(self.sub_goals))
 
     @override
     def update(
         self,
-        stats: EpisodeStats,
+        stats: HopStats,
         sensed: Sensed,
         torque: jax.Array,
-        params: TaskParams,
+        params: HopParams,
         goal: jax.Array,
-    ) -> EpisodeStats:
+    ) -> HopStats:
         after = updated(self.creature, self.step, stats, sensed, goal)
         after = with_extras(after, sensed, torque, self.step, self.sub_goals)
         return rested(after, self.horizon, params.rest, touches(self.creature, sensed))
 
     @override
-    def evaluate(self, stats: EpisodeStats, settings: HopConfig) -> dict[str, jax.Array]:
+    def evaluate(self, stats: HopStats, settings: HopConfig) -> dict[str, jax.Array]:
         return fitness_terms(self.creature, self.horizon, stats)
 
-    def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
+    def outcome(self, stats: HopStats) -> dict[str, jax.Array]:
         """Final distance in m and in goal distances; s to the arrival and the end."""
         left = away(stats)
         return {
@@ -130,14 +131,14 @@ class Hop(PlainTask):
 
 
 @pytree
-class TravelStats(hop.EpisodeStats):
-    """Extension of `hop.EpisodeStats`; goal is the latest. reached: [] goals."""
+class TravelStats(HopStats):
+    """Extension of `HopStats`; goal is the latest. reached: [] goals."""
 
     reached: jax.Array
 
 
 @pytree
-class Goal:
+class TravelGoal:
     """Goal of the moment.
 
     ahead: [] m from the start to the goal. spacing: [] m from one goal to the next.
@@ -156,11 +157,11 @@ class Travel(Hop):
     def goal(self, trial: Starts) -> Any:
         """The distance to the first goal is also the spacing of all others."""
         goal = jnp.asarray(trial.goal)
-        return Goal(goal, goal)
+        return TravelGoal(goal, goal)
 
-    def next_goal(self, goal: Goal, sensed: Sensed) -> Goal:
+    def next_goal(self, goal: TravelGoal, sensed: Sensed) -> TravelGoal:
         """A goal that is near, or passed, moves on."""
-        left = hop.goal_distance(self.creature, goal.ahead, sensed)
+        left = goal_distance(self.creature, goal.ahead, sensed)
         reached = left <= NEAR * goal.spacing
         return dataclasses.replace(goal, ahead=goal.ahead + jnp.where(reached, goal.spacing, 0.0))
 
@@ -174,13 +175,13 @@ class Travel(Hop):
 
     @override
     def update(
-        self, stats: EpisodeStats, sensed: Sensed, torque: jax.Array, params: TaskParams, goal: Any
+        self, stats: HopStats, sensed: Sensed, torque: jax.Array, params: HopParams, goal: Any
     ) -> Any:
         after: Any = super().update(stats, sensed, torque, params, goal.ahead)
         reached = jnp.round(goal.ahead / goal.spacing).astype(jnp.int32) - 1
         return dataclasses.replace(after, reached=reached)
 
-    def evaluate(self, stats: EpisodeStats, settings: object) -> dict[str, jax.Array]:
+    def evaluate(self, stats: HopStats, settings: object) -> dict[str, jax.Array]:
         """Style counts in proportion to the share of the way to the nominal goal."""
         way = self._way(stats) / NOMINAL_GOAL
         style = style_terms(self.creature, self.horizon, stats)
@@ -201,5 +202,5 @@ class Travel(Hop):
     ) -> dict[str, jax.Array]:
         return signed_weights(settings, generation)
 
-    def _way(self, stats: EpisodeStats) -> jax.Array:
+    def _way(self, stats: HopStats) -> jax.Array:
         return jnp.where(stats.steps > 0, stats.goal - stats.left, 0.0)

@@ -14,7 +14,7 @@ from mjxgait.config.tables import (
 
 
 @dataclasses.dataclass(frozen=True)
-class GoalConfig:
+class GoalThresholds:
     """Thresholds common to tasks with a goal, in place of criteria 1 to 3 and 7.
 
     Attributes:
@@ -31,7 +31,7 @@ class GoalConfig:
 
 
 @dataclasses.dataclass(frozen=True)
-class HopConfig(GoalConfig):
+class HopThresholds(GoalThresholds):
     """Thresholds for `hop`.
 
     Attributes:
@@ -45,7 +45,7 @@ class HopConfig(GoalConfig):
 
 
 @dataclasses.dataclass(frozen=True)
-class LimboConfig(HopConfig):
+class LimboThresholds(HopThresholds):
     """Thresholds for `limbo`: those of `hop`, and the clearance.
 
     Attributes:
@@ -62,7 +62,7 @@ class LimboConfig(HopConfig):
 
 
 @dataclasses.dataclass(frozen=True)
-class TravelConfig(GoalConfig):
+class TravelThresholds(GoalThresholds):
     """Thresholds for `travel`: goal distances as for `hop`.
 
     The task defines the distance at which a goal counts as reached (docs/reference/hop.md); it is

@@ -16,6 +16,7 @@ from mjxgait.certification.criteria import (
     Measure,
     at_least,
     at_most,
+    failures,
     joint_overrun,
     steady,
 )
@@ -28,11 +29,11 @@ from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.sight import Grown
 from mjxgait.reference.starts import Starts
 from mjxgait.tasks.modular.thresholds import (
-    BlocksConfig,
-    GoingConfig,
-    JumpConfig,
-    RoamConfig,
-    SwimConfig,
+    BlocksThresholds,
+    GoingThresholds,
+    JumpThresholds,
+    RoamThresholds,
+    SwimThresholds,
 )
 
 UNITS = {"speed": "m/s", "height": "m"}
@@ -56,7 +57,7 @@ class ModularCriteria(StaysUp, abc.ABC):
     """Metric of a trial in evolution that shows the performance."""
 
     @abc.abstractmethod
-    def wanted(self, config: CertificateConfig) -> BlocksConfig:
+    def wanted(self, config: CertificateConfig) -> BlocksThresholds:
         """Thresholds of this task."""
 
     @abc.abstractmethod
@@ -101,11 +102,10 @@ class ModularCriteria(StaysUp, abc.ABC):
         """Evaluate criteria 2, 6, 8, 9, and the task's own."""
         window, other = whole.window(config.warmup), halved.window(config.warmup)
         does, repeated = (self.second(each, config) for each in (window, other))
-        failed = sum(not m.passed for m in repeated.measures)
         done, halved_done = self.done(window), self.done(other)
         change = abs(halved_done / done - 1) if done else np.inf
         halves = (
-            at_most("failures in 2", failed, 0.0),
+            at_most("failures in 2", failures(repeated), 0.0),
             at_most("change", change, config.half_step.distance),
         )
         wanted = self.wanted(config)
@@ -161,7 +161,7 @@ class GoingCriteria(ModularCriteria):
 
     @abc.abstractmethod
     @override
-    def wanted(self, config: CertificateConfig) -> GoingConfig: ...
+    def wanted(self, config: CertificateConfig) -> GoingThresholds: ...
 
     @override
     def second(self, window: Recording, config: CertificateConfig) -> Criterion:
@@ -185,7 +185,7 @@ class GoingCriteria(ModularCriteria):
         return seen(window).middle[:, : self.axes]
 
 
-def gets_on(name: str, middle: np.ndarray, time_step: float, config: GoingConfig) -> Criterion:
+def gets_on(name: str, middle: np.ndarray, time_step: float, config: GoingThresholds) -> Criterion:
     """2. The body moves away, straight, and does not slow down; middle: [T, 2 or 3] m."""
     half = len(middle) // 2
     first, second = (
@@ -199,12 +199,12 @@ def gets_on(name: str, middle: np.ndarray, time_step: float, config: GoingConfig
         (
             at_least("speed (m/s)", float(flight(middle, time_step)), config.speed),
             at_least("way / path", straight, config.straight, 1.0),
-            steady(first, second, config.second_half),
+            steady("second half / first half", first, second, config.second_half),
         ),
     )
 
 
-def machine(window: Recording, config: CertificateConfig, wanted: BlocksConfig) -> Criterion:
+def machine(window: Recording, config: CertificateConfig, wanted: BlocksThresholds) -> Criterion:
     """8. No physics exploit: speeds, angles and torques that a machine could have."""
     limit = window.dimensions.torque_limit
     overrun, fastest = joint_overrun(window).max(), np.abs(window.joint_vel).max()
@@ -226,7 +226,7 @@ def machine(window: Recording, config: CertificateConfig, wanted: BlocksConfig) 
     )
 
 
-def apart(window: Recording, config: BlocksConfig, on_land: bool) -> Criterion:
+def apart(window: Recording, config: BlocksThresholds, on_land: bool) -> Criterion:
     """9. No block is in another that it is not joined to, nor in the ground.
 
     Overlaps count whether they come from growth or from motion.
@@ -267,7 +267,7 @@ class SwimCriteria(GoingCriteria):
     drag = DRAG
 
     @override
-    def wanted(self, config: CertificateConfig) -> SwimConfig:
+    def wanted(self, config: CertificateConfig) -> SwimThresholds:
         return config.swim
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
@@ -275,7 +275,7 @@ class SwimCriteria(GoingCriteria):
         return (by_water(window, config.swim),)
 
 
-def by_water(window: Recording, config: SwimConfig) -> Criterion:
+def by_water(window: Recording, config: SwimThresholds) -> Criterion:
     """11. All momentum comes from the water: not from elsewhere, nor from the error of a step."""
     water = seen(window)
     given = np.cumsum(water.push[:-1], axis=0) * window.time_step
@@ -299,7 +299,7 @@ class RoamCriteria(GoingCriteria):
     """Criterion 7 was added."""
 
     @override
-    def wanted(self, config: CertificateConfig) -> RoamConfig:
+    def wanted(self, config: CertificateConfig) -> RoamThresholds:
         return config.roam
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
@@ -313,7 +313,7 @@ def on_land(window: Recording, config: CertificateConfig) -> tuple[Criterion, ..
     return (balanced(window, config.roam), gait)
 
 
-def balanced(window: Recording, config: RoamConfig) -> Criterion:
+def balanced(window: Recording, config: RoamThresholds) -> Criterion:
     """1. The body does not tip over from its settled attitude."""
     up = np.stack([-np.sin(window.pitch), np.sin(window.roll), window.trunk_up], axis=1)
     upright = (up @ up[0]).min()
@@ -336,7 +336,7 @@ class JumpCriteria(ModularCriteria):
     leaps = True
 
     @override
-    def wanted(self, config: CertificateConfig) -> JumpConfig:
+    def wanted(self, config: CertificateConfig) -> JumpThresholds:
         return config.jump
 
     @override

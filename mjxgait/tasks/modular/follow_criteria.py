@@ -14,7 +14,7 @@ from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import Starts
 from mjxgait.tasks.modular.criteria import ModularCriteria, by_water, counted, seen
 from mjxgait.tasks.modular.criteria import on_land as walks
-from mjxgait.tasks.modular.thresholds import FollowConfig
+from mjxgait.tasks.modular.thresholds import FollowThresholds
 
 
 class FollowCriteria(ModularCriteria):
@@ -30,7 +30,7 @@ class FollowCriteria(ModularCriteria):
         self.axes = 3 if drag else 2
 
     @override
-    def wanted(self, config: CertificateConfig) -> FollowConfig:
+    def wanted(self, config: CertificateConfig) -> FollowThresholds:
         return config.follow
 
     @override

@@ -19,8 +19,8 @@ from typing_extensions import override
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.physics.batched_trees.tree import ModularSensed
-from mjxgait.tasks import base as protocol
-from mjxgait.tasks.base import FINISHED, ramp
+from mjxgait.tasks.base import EpisodeStats
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.modular.config import (
     BlocksConfig,
     JumpConfig,
@@ -32,6 +32,7 @@ from mjxgait.tasks.modular.config import (
 )
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.starts import NEVER, Starts, half_widths
+from mjxgait.tasks.terms import ramp
 from mjxgait.types import Sensed, pytree
 
 WILD = 1
@@ -47,8 +48,8 @@ def own(sensed: Sensed) -> ModularSensed:
 
 
 @pytree
-class EpisodeStats(protocol.EpisodeStats):
-    """Extension of `base.EpisodeStats`.
+class GoingStats(EpisodeStats):
+    """Extension of `EpisodeStats`.
 
     settled, place: [3] m, centre of mass when counting began, and now.
     light: [3] m, its place. since: [] step from which the way counts. None without a light.
@@ -93,7 +94,7 @@ class BlocksTask(PlainTask):
     def ended(self, sensed: Sensed, goal: object) -> jax.Array:
         speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
         wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
-        return jnp.where(wild | (own(sensed).limit_excess > FURTHEST), WILD, FINISHED)
+        return jnp.where(wild | (own(sensed).limit_excess > FURTHEST), WILD, Reason.FINISHED)
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
         """The first term is a reward, all others are penalties.
@@ -117,7 +118,7 @@ class GoingTask(BlocksTask):
     axes: ClassVar[int] = 3
     dark: ClassVar[np.ndarray | None] = None
 
-    def way(self, stats: EpisodeStats) -> jax.Array:
+    def way(self, stats: GoingStats) -> jax.Array:
         """Straight-line distance [] in m from where counting began."""
         return length((stats.place - stats.settled)[: self.axes])
 
@@ -145,11 +146,11 @@ class GoingTask(BlocksTask):
             place=own(sensed).com,
         )
 
-    def speed(self, stats: EpisodeStats, settings: BlocksConfig) -> jax.Array:
+    def speed(self, stats: GoingStats, settings: BlocksConfig) -> jax.Array:
         """Speed [] in m/s over the time that counts, even if the episode ended early."""
         return self.way(stats) / jnp.maximum(self.horizon * self.step - settings.settle, self.step)
 
-    def outcome(self, stats: EpisodeStats) -> Mapping[str, jax.Array]:
+    def outcome(self, stats: GoingStats) -> Mapping[str, jax.Array]:
         """Distance in m from where counting began, and s until the end."""
         return {"way": self.way(stats), "seconds": stats.steps * self.step}
 
@@ -169,8 +170,8 @@ LITTLE = 1e-6
 
 
 @pytree
-class SwimStats(EpisodeStats):
-    """Extension of `EpisodeStats`.
+class SwimStats(GoingStats):
+    """Extension of `GoingStats`.
 
     began: [3] kg·m/s, momentum of the body when counting began.
     given: [3] kg·m/s, from the water since then. exchanged: [] the same without directions.
@@ -229,8 +230,8 @@ class Swim(GoingTask):
 
 
 @pytree
-class RoamStats(EpisodeStats):
-    """Extension of `EpisodeStats`.
+class RoamStats(GoingStats):
+    """Extension of `GoingStats`.
 
     upwards: [3] direction in the root's axes that was up when counting began.
     upright: [] least cosine of its angle with the world's up axis since then.
@@ -295,8 +296,8 @@ in the trial that it was selected by.
 
 
 @pytree
-class JumpStats(protocol.EpisodeStats):
-    """Extension of `base.EpisodeStats`.
+class JumpStats(EpisodeStats):
+    """Extension of `EpisodeStats`.
 
     heights: [SPANS] m, greatest height of the lowest part in each.
     """

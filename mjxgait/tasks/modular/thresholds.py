@@ -14,7 +14,7 @@ from mjxgait.config.tables import (
 
 
 @dataclasses.dataclass(frozen=True)
-class BlocksConfig:
+class BlocksThresholds:
     """Thresholds common to modular bodies, in place of criteria 1 to 5 and 7.
 
     Attributes:
@@ -33,7 +33,7 @@ class BlocksConfig:
 
 
 @dataclasses.dataclass(frozen=True)
-class GoingConfig(BlocksConfig):
+class GoingThresholds(BlocksThresholds):
     """Thresholds common to tasks of getting away.
 
     Attributes:
@@ -48,7 +48,7 @@ class GoingConfig(BlocksConfig):
 
 
 @dataclasses.dataclass(frozen=True)
-class JumpConfig(BlocksConfig):
+class JumpThresholds(BlocksThresholds):
     """Thresholds for `jump`.
 
     Attributes:
@@ -60,7 +60,7 @@ class JumpConfig(BlocksConfig):
 
 
 @dataclasses.dataclass(frozen=True)
-class SwimConfig(GoingConfig):
+class SwimThresholds(GoingThresholds):
     """Thresholds for `swim`.
 
     Attributes:
@@ -72,7 +72,7 @@ class SwimConfig(GoingConfig):
 
 
 @dataclasses.dataclass(frozen=True)
-class RoamConfig(GoingConfig):
+class RoamThresholds(GoingThresholds):
     """Thresholds for `roam`.
 
     Attributes:
@@ -85,7 +85,7 @@ class RoamConfig(GoingConfig):
 
 
 @dataclasses.dataclass(frozen=True)
-class FollowConfig(BlocksConfig):
+class FollowThresholds(BlocksThresholds):
     """Additional thresholds for `follow`, on top of those for `swim` or `roam`.
 
     Attributes:

@@ -7,7 +7,7 @@ from typing_extensions import override
 
 from mjxgait.certification.acceptance import PlainCriteria, to_the_end
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.criteria import Criterion, at_least, at_most
+from mjxgait.certification.criteria import Criterion, at_least, at_most, steady
 from mjxgait.certification.describe import vibration
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording
@@ -34,7 +34,6 @@ class TurnCriteria(PlainCriteria):
         turned = np.degrees(_heading(window))
         seconds, half = len(turned) * window.time_step, len(turned) // 2
         first, second = turned[half] - turned[0], turned[-1] - turned[half]
-        kept = second / first if first > 0 else np.nan
         away = np.linalg.norm(window.trunk_pos[:, :2] - window.trunk_pos[0, :2], axis=1)
         near = away.max() / window.dimensions.hip_height
         shakes = vibration(window, CertificateConfig().gait)
@@ -44,7 +43,7 @@ class TurnCriteria(PlainCriteria):
                 "turns",
                 (
                     at_least("turn (deg/s)", (turned[-1] - turned[0]) / seconds, RATE),
-                    at_least("second half's turn / first", kept, HALF, 1.0),
+                    steady("second half's turn / first", first, second, HALF),
                 ),
             ),
             Criterion(

@@ -9,8 +9,9 @@ import jax.numpy as jnp
 from typing_extensions import override
 
 from mjxgait.config.tables import STRICT, Positive
-from mjxgait.tasks.base import EpisodeStats, crossed, positive_work
+from mjxgait.tasks.base import EpisodeStats
 from mjxgait.tasks.plain import PlainTask
+from mjxgait.tasks.terms import crossed, positive_work
 from mjxgait.types import Sensed, pytree
 
 

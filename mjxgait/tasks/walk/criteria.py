@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from typing_extensions import override
 
-from mjxgait.certification.acceptance import StaysUp, to_the_end
+from mjxgait.certification.acceptance import StaysUp, Wish, to_the_end
 from mjxgait.certification.config import (
     CertificateConfig,
     GaitConfig,
@@ -22,6 +22,7 @@ from mjxgait.certification.criteria import (
     at_least,
     at_most,
     distance,
+    failures,
     obstacle,
     parts,
     physics,
@@ -50,7 +51,6 @@ from mjxgait.reference.measure import (
 from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.tasks.walk.gaits import gait_of, transition
 from mjxgait.tasks.walk.target_criteria import (
-    Wish,
     as_asked,
     commanded_heading,
     draw_commands,
@@ -163,7 +163,7 @@ def lean(window: Recording, config: Fall) -> Measure:
 def progress(window: Recording, config: ProgressConfig) -> Criterion:
     """2. All strides lead forward, fast enough, straight, without slowing down."""
     path, starts = window.trunk_pos, stride_starts(window)
-    distance, middle = path[-1, 0] - path[0, 0], len(path) // 2
+    middle = len(path) // 2
     first, second = path[middle, 0] - path[0, 0], path[-1, 0] - path[middle, 0]
     advance = np.diff(path[starts, 0]) if len(starts) > 1 else np.array([np.nan])
     sideways = np.abs(path[:, 1] - path[0, 1]).max()
@@ -180,9 +180,9 @@ def progress(window: Recording, config: ProgressConfig) -> Criterion:
                 speed(window) / window.dimensions.body_length,
                 config.speed,
             ),
-            at_most("drift / distance", ratio(sideways, distance), config.drift),
+            at_most("drift / distance", ratio(sideways, distance(window)), config.drift),
             at_most("off straight ahead (deg)", heading_off(window), config.heading),
-            steady(first, second, config.second_half),
+            steady("second half / first half", first, second, config.second_half),
         ),
     )
 
@@ -229,9 +229,8 @@ def autocorrelation_peak(signal: np.ndarray, period: float) -> float:
 def half_step(whole: Recording, halved: Recording, config: CertificateConfig) -> Criterion:
     """6. With half the time step the walk still passes 1 to 3 and goes as far."""
     window = whole.window(config.warmup)
-    repeated = basic(halved, config)
     change = distance(halved.window(config.warmup)) / distance(window) - 1
-    failed = sum(not m.passed for c in repeated for m in c.measures)
+    failed = failures(*basic(halved, config))
     return Criterion(
         6,
         "half the time step",

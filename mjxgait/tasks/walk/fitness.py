@@ -11,10 +11,12 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.creature.body import Body
-from mjxgait.tasks.base import Reason, cost_of_transport, crossed, ramped
+from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.terms import cost_of_transport, crossed, ramped
 from mjxgait.tasks.walk.config import LIKENESS, TargetConfig, WalkConfig, Weights
 from mjxgait.tasks.walk.gaits import GRAVITY, animal_duty, animal_stride, most_strides, stride_limit
-from mjxgait.tasks.walk.stats import EpisodeStats, TargetStats, gait_missed
+from mjxgait.tasks.walk.stats import WalkStats
+from mjxgait.tasks.walk.target_stats import TargetStats, gait_missed
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
@@ -43,7 +45,7 @@ BEYOND = 0.02
 
 
 def fitness_terms(
-    creature: Body, config: WalkConfig, step: float, horizon: int, stats: EpisodeStats
+    creature: Body, config: WalkConfig, step: float, horizon: int, stats: WalkStats
 ) -> dict[str, jax.Array]:
     """Return the terms [] of one episode, each without unit and before its weight.
 
@@ -69,7 +71,7 @@ def terms_under(weights: Weights) -> tuple[str, ...]:
 
 
 def plain_terms(
-    creature: Body, config: WalkConfig, step: float, horizon: int, stats: EpisodeStats
+    creature: Body, config: WalkConfig, step: float, horizon: int, stats: WalkStats
 ) -> tuple[dict[str, jax.Array], jax.Array]:
     """Return the terms with style in full, and the body lengths [] up to which farther is better.
 
@@ -118,7 +120,7 @@ def _in_hip_speeds(creature: Body, speed: jax.Array) -> jax.Array:
     return speed / (GRAVITY * creature.frame.hip_height) ** 0.5
 
 
-def _patter(stats: EpisodeStats) -> jax.Array:
+def _patter(stats: WalkStats) -> jax.Array:
     """Contact flicker [F] of each foot, 0 to 1.
 
     The first touchdown and those that end a swing do not count.
@@ -265,7 +267,7 @@ def likeness(creature: Body, step: float, horizon: int, stats: TargetStats) -> d
     }
 
 
-def steady_speed(step: float, horizon: int, stats: EpisodeStats) -> jax.Array:
+def steady_speed(step: float, horizon: int, stats: WalkStats) -> jax.Array:
     """Speed [] in m/s over the second half of the episode, or over all of a shorter one."""
     half = horizon // 2
     late = stats.steps > half

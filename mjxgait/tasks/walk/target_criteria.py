@@ -4,11 +4,11 @@ Letters: `T` frames.
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
+from mjxgait.certification.acceptance import Wish
 from mjxgait.certification.config import CertificateConfig, TargetsConfig
 from mjxgait.certification.criteria import (
     Criterion,
@@ -21,8 +21,6 @@ from mjxgait.certification.describe import footfall_phases, gait_name, likeness
 from mjxgait.reference.measure import Dimensions, Recording
 from mjxgait.reference.outcome import Outcome
 from mjxgait.tasks.walk.gaits import SHORTEST, animal_stride, gait_of
-
-Wish = Mapping[str, Any]
 
 ASKED, BOUNDS = "as asked", ("gait", "physics")
 """Names of criteria: the one for targets, and those that bound what a body can do."""

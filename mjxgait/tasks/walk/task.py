@@ -13,9 +13,9 @@ from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.tasks.base import hardness
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.starts import Starts, draw_starts, milder
+from mjxgait.tasks.terms import hardness
 from mjxgait.tasks.walk.config import TargetConfig, WalkConfig
 from mjxgait.tasks.walk.fitness import (
     fitness_terms,
@@ -24,9 +24,8 @@ from mjxgait.tasks.walk.fitness import (
     terms_under,
     wished_terms,
 )
-from mjxgait.tasks.walk.stats import (
-    EpisodeStats,
-    StatsRecorder,
+from mjxgait.tasks.walk.stats import StatsRecorder, WalkStats
+from mjxgait.tasks.walk.target_stats import (
     TargetStats,
     along,
     target_stats,
@@ -98,20 +97,20 @@ class Walk(PlainTask):
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
     @override
-    def init(self) -> EpisodeStats:
+    def init(self) -> WalkStats:
         return self._recorder.init()
 
     @override
     def update(
         self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
-    ) -> EpisodeStats:
+    ) -> WalkStats:
         return self._recorder.update(stats, sensed, torque, params)
 
     @override
     def evaluate(self, stats: Any, settings: WalkConfig) -> dict[str, jax.Array]:
         return fitness_terms(self.creature, settings, self.step, self.horizon, stats)
 
-    def outcome(self, stats: EpisodeStats) -> dict[str, jax.Array]:
+    def outcome(self, stats: WalkStats) -> dict[str, jax.Array]:
         """Distance in m forward and to the left, and s until the end."""
         return {
             "forward": stats.forward,

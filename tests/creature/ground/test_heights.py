@@ -7,7 +7,7 @@ import numpy as np
 
 from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature
-from mjxgait.tasks.base import Reason, why_fallen
+from mjxgait.tasks.falls import Reason, why_fallen
 from mjxgait.types import Sensed
 
 

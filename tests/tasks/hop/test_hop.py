@@ -22,26 +22,15 @@ from mjxgait.plugins import resolve_config
 from mjxgait.plugins.registry import build_config
 from mjxgait.plugins.user_code import load
 from mjxgait.reference.starts import nominal_starts
-from mjxgait.tasks.base import Reason
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.config import (
     GOALS,
     NOMINAL_GOAL,
     HopConfig,
     HopWeights,
 )
-from mjxgait.tasks.hop.stats import (
-    STYLE,
-    TERMS,
-    EpisodeStats,
-    away,
-    empty,
-    fitness_terms,
-    goal_distance,
-    rested,
-    signed_weights,
-    terms_under,
-    updated,
-)
+from mjxgait.tasks.hop.fitness import STYLE, TERMS, fitness_terms, signed_weights, terms_under
+from mjxgait.tasks.hop.stats import HopStats, away, empty, goal_distance, rested, updated
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.starts import Starts, draw_starts
 from mjxgait.tasks.walk.config import WalkConfig
@@ -115,7 +104,7 @@ def test_goal_distance_is_along_the_starts_forward_axis(stool: Creature):
 # The statistics
 
 
-def after(creature: Creature, moments: list[Sensed], goal: float = 1.0) -> EpisodeStats:
+def after(creature: Creature, moments: list[Sensed], goal: float = 1.0) -> HopStats:
     stats = empty(creature, HORIZON)
     for sensed in moments:
         stats = updated(creature, STEP, stats, sensed, jnp.float32(goal))
@@ -259,7 +248,7 @@ def test_every_term_has_a_nonzero_case():
     assert {name for name, value, _ in CASES if value} == set(TERMS)
 
 
-def tallied(task: Hop, moments: list[Sensed], torques: list[list[float]]) -> EpisodeStats:
+def tallied(task: Hop, moments: list[Sensed], torques: list[list[float]]) -> HopStats:
     stats = task.init()
     for sensed, torque in zip(moments, torques, strict=True):
         params = task.params(task.settings)
@@ -357,7 +346,7 @@ def experiment(stool: Creature, tmp_path_factory: pytest.TempPathFactory) -> Exp
 
 
 @pytest.fixture(scope="module")
-def evaluated(experiment: Experiment) -> tuple[EvolutionState, EpisodeStats]:
+def evaluated(experiment: Experiment) -> tuple[EvolutionState, HopStats]:
     """The first population, and the statistics [6, 3] of its trials."""
     state = experiment.init()
     return state, jax.device_get(jax.jit(experiment.simulate)(state.genomes).stats)

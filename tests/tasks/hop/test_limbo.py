@@ -30,9 +30,9 @@ from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.starts import nominal_starts, perturbed_starts
 from mjxgait.tasks.hop import config as evolution
 from mjxgait.tasks.hop.config import BAR_PLACE, LimboConfig, LimboWeights
-from mjxgait.tasks.hop.limbo import Goal, Limbo, bar_distance, intrusion
-from mjxgait.tasks.hop.stats import signed_weights, terms_under
-from mjxgait.tasks.hop.thresholds import LimboConfig as Demanded
+from mjxgait.tasks.hop.fitness import signed_weights, terms_under
+from mjxgait.tasks.hop.limbo import Limbo, LimboGoal, bar_distance, intrusion
+from mjxgait.tasks.hop.thresholds import LimboThresholds
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.generation import (
     LEADERS,
@@ -167,7 +167,7 @@ def test_the_deepest_intrusion_costs_fitness(luxo: Creature):
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     moments = [sensed(luxo, posed(luxo, ahead)) for ahead in (0.0, 0.5, 1.4)]
     stats, params = task.init(), task.params(LimboConfig(height=HEIGHT))
-    goal = Goal(ahead=jnp.float32(1.4), raised=jnp.float32(0.03))
+    goal = LimboGoal(ahead=jnp.float32(1.4), raised=jnp.float32(0.03))
     for moment in moments:
         stats = task.update(stats, moment, jnp.zeros(3), params, goal)
     assert float(stats.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
@@ -291,7 +291,7 @@ def test_bar_height_is_a_parameter_of_one_program(stool: Creature):
 
 
 def test_evolution_and_certification_have_the_same_bar_and_goals():
-    acceptance = Demanded()
+    acceptance = LimboThresholds()
     assert (acceptance.place, EXAMINED_RADIUS) == (BAR_PLACE, evolution.BAR_RADIUS)
     assert acceptance.height == LimboConfig().height == HEIGHT
     assert (acceptance.goals, acceptance.nominal) == (

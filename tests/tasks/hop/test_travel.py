@@ -26,8 +26,8 @@ from mjxgait.tasks.hop.config import (
     NOMINAL_GOAL,
     TravelConfig,
 )
-from mjxgait.tasks.hop.task import Goal, Travel
-from mjxgait.tasks.hop.thresholds import TravelConfig as Demanded
+from mjxgait.tasks.hop.task import Travel, TravelGoal
+from mjxgait.tasks.hop.thresholds import TravelThresholds
 from mjxgait.training.experiment import build_experiment
 
 CONFIG, DEMANDS = CertificateConfig(), acceptance_of("travel")
@@ -37,8 +37,8 @@ def task(creature: Creature) -> Travel:
     return Travel(creature, STEP, HORIZON, creature.settings.termination)
 
 
-def goal_at(ahead: float, spacing: float) -> Goal:
-    return Goal(jnp.float32(ahead), jnp.float32(spacing))
+def goal_at(ahead: float, spacing: float) -> TravelGoal:
+    return TravelGoal(jnp.float32(ahead), jnp.float32(spacing))
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_evolution_and_reference_simulator_move_the_same_goals(
 
 
 def test_certification_and_evolution_have_the_same_goals():
-    acceptance = Demanded()
+    acceptance = TravelThresholds()
     assert (acceptance.goals, acceptance.nominal, travel.NEAR) == (GOALS, NOMINAL_GOAL, NEAR)
 
 

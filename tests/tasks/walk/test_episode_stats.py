@@ -21,15 +21,9 @@ from disturbed_walks import (
 from recorded_stats import Frames, end, stats_of
 
 from mjxgait.creature import Creature
-from mjxgait.tasks.base import Reason, why_fallen
-from mjxgait.tasks.walk.stats import (
-    CONTACT_GAP,
-    EpisodeStats,
-    StatsRecorder,
-    TargetStats,
-    target_stats,
-    target_updated,
-)
+from mjxgait.tasks.falls import Reason, why_fallen
+from mjxgait.tasks.walk.stats import CONTACT_GAP, StatsRecorder, WalkStats
+from mjxgait.tasks.walk.target_stats import TargetStats, target_stats, target_updated
 from mjxgait.types import Sensed
 
 
@@ -92,7 +86,7 @@ def expected(body: Creature, recordings: list[Frames]) -> list[dict]:
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "reason"])
 def test_running_sums_match_the_recordings(
-    evaluation: tuple[EpisodeStats, jax.Array], expected: list[dict], name: str
+    evaluation: tuple[WalkStats, jax.Array], expected: list[dict], name: str
 ):
     rows = zip(EPISODES, getattr(evaluation[0], name), expected, strict=True)
     for episode, ours, stats in rows:
@@ -132,7 +126,7 @@ def test_reach_and_pitch_are_summed_from_the_same_moments(
 
 
 def test_an_episode_ends_when_the_recording_does(
-    evaluation: tuple[EpisodeStats, jax.Array], recordings: list[Frames]
+    evaluation: tuple[WalkStats, jax.Array], recordings: list[Frames]
 ):
     found = set()
     for episode, reasons, frames in zip(EPISODES, evaluation[1], recordings, strict=True):

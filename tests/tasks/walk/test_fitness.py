@@ -9,7 +9,8 @@ import pytest
 from helpers import altered, small_config, weight_vector
 
 from mjxgait.creature import Creature
-from mjxgait.tasks.base import Reason, hardness, ramped, score
+from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.terms import hardness, ramped, score
 from mjxgait.tasks.walk.config import WalkConfig, Weights
 from mjxgait.tasks.walk.fitness import (
     REWARDS,

@@ -25,7 +25,8 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.plugins import resolve_config
 from mjxgait.plugins.fit import check_fit
-from mjxgait.tasks.base import in_order, score
+from mjxgait.tasks.base import in_order
+from mjxgait.tasks.terms import score
 from mjxgait.tasks.walk.config import TargetWeights, WalkConfig, Weights
 from mjxgait.tasks.walk.fitness import REWARDS, TERMS, terms_under
 from mjxgait.tasks.walk.gaits import (
@@ -35,7 +36,8 @@ from mjxgait.tasks.walk.gaits import (
     placed,
     stations_of,
 )
-from mjxgait.tasks.walk.stats import EpisodeStats, Footfalls, gait_missed, no_footfalls, stepped
+from mjxgait.tasks.walk.stats import WalkStats
+from mjxgait.tasks.walk.target_stats import Footfalls, gait_missed, no_footfalls, stepped
 from mjxgait.tasks.walk.targets import (
     WalkTargets,
     configured,
@@ -190,7 +192,7 @@ def test_without_targets_a_walk_has_no_target_terms(body: Creature):
     task = Walk.with_settings(body, STEP, HORIZON, body.settings.termination, free)
     assert type(task) is Walk
     assert task.terms == terms_under(free.weights)
-    assert type(task.init()) is EpisodeStats
+    assert type(task.init()) is WalkStats
     asks = traced_fitness(config_of()).wish
     assert len(jax.tree.leaves(asks)) == len(jax.tree.leaves(traced_fitness(free).wish)) + 1
 
@@ -211,10 +213,10 @@ def footfalls_of(phases: list[float], duty: float, period: int = 160) -> Footfal
     return jax.lax.scan(step, first, swinging)[0][0]
 
 
-BLANK = EpisodeStats(
+BLANK = WalkStats(
     **{
         field.name: jnp.zeros((), jnp.int32 if field.name == "steps" else None)
-        for field in dataclasses.fields(EpisodeStats)
+        for field in dataclasses.fields(WalkStats)
     }
 )
 PLACES = {
