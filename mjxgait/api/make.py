@@ -71,6 +71,7 @@ def train(
     expressions: Place | None = None,
     source: Place | None = None,
     seed: int = 0,
+    tries: int = 1,
     population: int | None = None,
     generations: int | None = None,
     settings: Table | None = None,
@@ -99,6 +100,7 @@ def train(
         (docs/reference/expressions.md).
       source: an earlier run; its last population is the first of this one.
       seed: of all random numbers.
+      tries: the most runs, with seeds from `seed` on, until one is certified; returns the last.
       population: individuals of a generation.
       generations: the most that are evolved.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
@@ -131,10 +133,34 @@ def train(
     creature = at_step(creature, chosen.rollout.step)
     if expressions is not None:
         chosen = with_expressions(creature, chosen, Path(expressions))
-    folder = check_run(Path(out) if out else None, creature, chosen)
-    begin = partial(create_run, folder, creature, chosen)
     initial = Path(source) if source else None
-    return _evolved(folder, creature, chosen, quiet, begin, initial, on_generation)
+    for folder, one in attempts(Path(out) if out else None, creature, chosen, tries):
+        begin = partial(create_run, folder, creature, one)
+        run = _evolved(folder, creature, one, quiet, begin, initial, on_generation)
+        if run.certified:
+            break
+    return run
+
+
+def attempts(
+    out: Path | None, creature: Creature, config: Config, count: int
+) -> list[tuple[Path, Config]]:
+    """Return the free folder and the settings of each of several new runs. Writes nothing.
+
+    Their seeds go from the config's on. The first folder is `out`; `-seedN` ends the others.
+
+    Raises:
+      UserError: there is none to make; see `check_run`.
+    """
+    if count < 1:
+        raise UserError(f"tries = {count}: give 1 or more")
+    found = []
+    for seed in range(config.seed, config.seed + count):
+        one = dataclasses.replace(config, seed=seed)
+        name = f"{out.name}-seed{seed}" if out and seed > config.seed else None
+        folder = out.with_name(name) if out and name else out
+        found.append((check_run(folder, creature, one), one))
+    return found
 
 
 def refine(

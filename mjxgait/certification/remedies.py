@@ -10,7 +10,9 @@ from collections.abc import Mapping
 
 from mjxgait.certification.criteria import Criterion, Measure
 
-AGAIN = "Train longer (--generations), or with another --seed; --runs 3 tries three seeds."
+AGAIN = (
+    "Train longer (--generations), or with other seeds: --tries 3 stops at the first that passes."
+)
 CALMER = "Ask for a slower walk: --speed, or a lower --fitness.speed."
 FALLS, AHEAD, USUAL, FOLLOWS = range(4)
 """Order of causes: a fall spoils all else, then a body that makes no headway. What only repeats

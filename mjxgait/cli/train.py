@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mjxgait.api import Run, load_creature
-from mjxgait.api.make import evolve
+from mjxgait.api.make import attempts, evolve
 from mjxgait.api.multi_seed import evolve_zoo
 from mjxgait.cli.options import parsed
 from mjxgait.cli.train_options import TrainOptions, options_of, short_options
@@ -33,7 +33,6 @@ from mjxgait.training.folder import (
     METRICS,
     PLOT,
     PLOTS,
-    check_run,
     command,
     create_run,
     open_run,
@@ -67,12 +66,14 @@ def train_command(arguments: Sequence[str]) -> int:
     if not options.quiet:
         for line in (*notes, *filter(None, [hint(config)])):
             print(line)
+    if options.tries != 1 and (options.resume or options.runs is not None):
+        raise UserError("--tries: for new runs one after another, without --resume and --runs")
     if options.runs is not None or _is_zoo(options.resume):
         return _several(options, creature, config, default)
     if options.generation is not None and options.resume is None:
         raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
     if options.resume is None:
-        return _evolve(options, check_run(options.out, creature, config), creature, config)
+        return _until_certified(options, creature, config)
     _check_resumed(options, config, default)
     from mjxgait.training.ended import nothing_left  # leads to JAX
 
@@ -94,6 +95,18 @@ def _check_resumed(options: TrainOptions, config: Config, default: Config) -> No
             f"{options.resume}: a resumed run keeps its settings; only --generations, "
             "--evolution.target and --examination may differ"
         )
+
+
+def _until_certified(options: TrainOptions, creature: Creature, config: Config) -> int:
+    """Evolve new runs until one is certified; return the exit code."""
+    code = 0
+    for number, (folder, one) in enumerate(attempts(options.out, creature, config, options.tries)):
+        if number and not options.quiet:
+            print(f"Not certified: seed {one.seed} is next, {number + 1} of {options.tries}.")
+        code = _evolve(options, folder, creature, one)
+        if code or Run(folder).certified:
+            break
+    return code
 
 
 def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Config) -> int:

@@ -23,8 +23,8 @@ class TrainOptions(Verbosity):
     or FILE.py:CLASS of your own (docs/guide/your-own-task.md).
 
     Attributes:
-      env: Name of a shipped creature, path of a creature folder, robot:NAME, or a model file to import
-        (MJCF, URDF, xacro, BVH or GLB).
+      env: Name of a shipped creature, path of a creature folder, robot:NAME, or a model file to
+        import (MJCF, URDF, xacro, BVH or GLB).
       config: TOML file with settings, or the name of a shipped config such as wilson.
       scale: Size factors of parts, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
         (docs/reference/creature-folder.md). Lengths, masses and inertias follow, gains do not.
@@ -37,6 +37,8 @@ class TrainOptions(Verbosity):
       out: Folder for the run; by default a new one under runs/.
       runs: Number of separate runs side by side, with seeds from --seed on: a folder with a run
         folder each, and a picture of all champions (docs/guide/studies.md).
+      tries: Number of runs at most, one after another with seeds from --seed on, until one is
+        certified. Each has a folder of its own.
       resume: Run folder to continue, with its own creature and settings. Only the settings that end
         a run may differ: --generations, --evolution.target, --examination.
       generation: With --resume: the checkpoint to continue from, instead of the latest.
@@ -50,7 +52,8 @@ class TrainOptions(Verbosity):
         This and --gait, --turn, --steer and --style are for walking (docs/guide/gaits.md).
       gait: On four feet walk, amble, trot, pace, canter, bound, gallop or hop; on six walk, tripod
         or wave; on eight alternating; on two walk, waddle or hop; natural: the gait of an
-        animal at this speed; auto: any gait. By default that of [usual] in creature.toml, or else auto.
+        animal at this speed; auto: any gait. By default that of [usual] in creature.toml, or else
+        auto.
       turn: Turn rate while walking, degrees per second to the left.
       steer: Largest commanded turn rate that the walk must follow, degrees per second to either
         side.
@@ -77,6 +80,7 @@ class TrainOptions(Verbosity):
     source: Annotated[Path | None, tyro.conf.arg(name="from")] = None
     out: Path | None = None
     runs: int | None = None
+    tries: int = 1
     resume: Path | None = None
     generation: int | None = None
     population: int | None = None
@@ -100,7 +104,7 @@ class TrainOptions(Verbosity):
 
 COMMON = (
     *("env", "out", "generations", "population", "speed", "gait", "style", "ground", "config"),
-    *("runs", "resume", "view", "quiet", "verbose"),
+    *("tries", "runs", "resume", "view", "quiet", "verbose"),
 )
 """Options that `--help` shows, besides `--seed`; `--help-all` shows all."""
 SHORT = f"""Evolve a walk for a creature.

@@ -12,7 +12,7 @@ from end_to_end.walks import faller, short_examination, small_settings, trained,
 from helpers import STOOL, said_by
 from web.engine import engine_folder
 
-from mjxgait.api import certify
+from mjxgait.api import Run, certify
 from mjxgait.certification import read_certificate
 from mjxgait.cli import COMMANDS
 from mjxgait.creature import load_creature
@@ -185,3 +185,33 @@ def test_each_seed_of_a_multi_seed_run_gets_a_certificate(
         folder = next(path.parent for path in Path("zoo").glob(f"*{seed}/{CERTIFICATE}"))
         assert open_run(folder)[1].seed == seed
     shutil.rmtree("zoo")
+
+
+@pytest.mark.parametrize("certified", [3, 4, None])
+def test_tries_go_on_until_a_run_is_certified(
+    certified: int | None, tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch
+):
+    """Of three, from seed 3 on; `certified`: the first seed whose run is, if any."""
+    monkeypatch.setattr(Run, "certified", property(lambda run: _seed(run.folder) == certified))
+    given = ("--env", STOOL, "--config", small_settings(tmp_path), "--generations", 1)
+    said = said_by(
+        capsys, "train", *given, "--seed", 3, "--tries", 3, "--no-plots", "--out", "run", code=0
+    )
+    seeds = range(3, (certified or 5) + 1)
+    made = {path.name: _seed(path) for path in Path().glob("run*")}
+    assert made == {"run" if seed == 3 else f"run-seed{seed}": seed for seed in seeds}
+    assert said.count("Not certified: seed") == len(seeds) - 1
+
+
+def test_no_run_begins_if_the_folder_of_a_later_one_is_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+):
+    Path("run-seed1").mkdir()
+    Path("run-seed1/mine.txt").write_text("mine")
+    said = said_by(capsys, "train", "--env", STOOL, "--tries", 2, "--out", "run", code=2)
+    assert "run-seed1: holds something else" in said
+    assert not Path("run").exists()
+
+
+def _seed(folder: Path) -> int:
+    return open_run(folder)[1].seed

@@ -127,6 +127,11 @@ def test_resuming_examined_runs_shows_the_results_again(
         (["--runs", "1"], "give 2 or more"),
         (["--runs", "2", "--evolution.islands.count", "2"], "islands do not go side by side"),
         (["--runs", "2", "--view"], "no --view, no --log and no --generation"),
+        (
+            ["--runs", "2", "--tries", "3"],
+            "new runs one after another, without --resume and --runs",
+        ),
+        (["--tries", "0"], "give 1 or more"),
     ],
 )
 def test_bad_input_gets_one_sentence(given: list[str], said: str, tmp_path, monkeypatch, capsys):
