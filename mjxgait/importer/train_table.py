@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from mjxgait.config.schema import Config, RolloutConfig
+from mjxgait.config.schema import Config
 from mjxgait.controllers.key_poses.config import unhurried
 from mjxgait.importer.notes import Confidence, Notes
 from mjxgait.tasks.walk.config import WalkConfig
@@ -13,8 +13,8 @@ STARTS, ALIVE = 6, 6.0
 """Evaluated trials, and weight of staying up to the end, of bodies that must step to catch a fall.
 """
 LONG, FIRST = 12.0, 4
-"""s, episode of such a body: in the usual 8 s it speeds up and does not yet fall. Individuals that are
-drawn for each of the first population: of fewer, some runs learn only to stand.
+"""s, episode of a body on two feet: in the usual 8 s it speeds up and does not yet fall. Number of
+individuals drawn for each of the first population: of fewer, some runs learn only to stand.
 """
 LATE, HASTY = 1, 8.0
 """Largest torque delay in control steps, which is what first fells such a body in its examination.
@@ -51,9 +51,10 @@ SMALLER = 0.03
 ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
-CROSSED = 12.0
-"""Weight of parts within each other, three times the default, of a character on one foot or two: its
-thick thighs and tail are close.
+CROSSED, NEAR = 12.0, 0.667
+"""Weight of parts within each other, three times the default, of a character on one foot or two:
+its thick thighs and tail are close. Weight of its distance: what a longer episode adds to it must
+not outweigh them.
 """
 FLICKER, LEISURE = 3.0, 0.65
 """Weight of feet that lose the floor for moments, of characters on more than two feet: their mass
@@ -111,7 +112,7 @@ def train_table(body: Traits, notes: Notes) -> Settings:
     else:
         settings, choice = four_feet(body)
     if body.skeleton and body.steps:
-        settings["fitness"]["weights"]["overlap"] = CROSSED
+        settings["fitness"]["weights"] |= {"overlap": CROSSED, "distance": NEAR}
         choice = (f"{choice[0]}; parts within each other cost", *choice[1:])
     elif body.skeleton:
         settings["fitness"]["speed"] = LEISURE
@@ -155,9 +156,7 @@ def few_feet(body: Traits) -> tuple[Settings, Choice]:
     """Settings of a body that must step to catch a fall."""
     hertz = BRISK * body.length / (STRIDE * body.hip)
     calm = min(WalkConfig().frequency, hertz / stride_limit(body.mass))
-    # What a longer episode adds to the distance, it must not take from posture and style.
-    distance = round(RolloutConfig().seconds / LONG, 3)
-    weights = {"distance": distance, "alive": ALIVE, "frequency": HASTY}
+    weights = {"alive": ALIVE, "frequency": HASTY}
     fitness: Settings = {"speed": BRISK, "frequency": round(calm, 2), "weights": weights}
     speed = f"{BRISK:g} body lengths/s in strides of {STRIDE:g} hip heights"
     if body.legs == 1:
@@ -168,17 +167,20 @@ def few_feet(body: Traits) -> tuple[Settings, Choice]:
         "controller": {"interpolation": body.steps_between_poses(BRISK)},
         # An undisturbed trial says little about robustness: evaluate all in all trials.
         "rollout": {
-            "seconds": LONG,
             "variety": GENERATIONS,
             "starts": STARTS,
             "promote": 1.0,
             "latency": LATE,
         },
-        "evolution": {"generations": GENERATIONS, "sigma": SMALLER, "initial_choice": FIRST},
+        "evolution": {"generations": GENERATIONS, "sigma": SMALLER},
         "fitness": fitness,
     }
+    if body.legs > 1:
+        settings["rollout"]["seconds"] = LONG
+        settings["evolution"]["initial_choice"] = FIRST
+        speed += f", in episodes of {LONG:g} s"
     what = (
-        f"{STARTS} starts of {LONG:g} s, others in each of {GENERATIONS} generations at most, with "
+        f"{STARTS} starts, others in each of {GENERATIONS} generations at most, with "
         f"torques up to {LATE} step late; small mutations; staying up counts {ALIVE:g}, {speed}"
     )
     why = "on one foot or two it falls unless it walks: more disturbed starts, and first of all to stay up"
