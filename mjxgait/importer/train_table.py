@@ -148,7 +148,10 @@ def many_hinges(body: Traits) -> tuple[Settings, Choice]:
     settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
     settings["evolution"] = {"sigma": SMALLER}
     what += f"; smaller ones, no haste; staying up counts {ALIVE:g}"
-    why = f"with more than {MANY} hinges for each leg it falls in most poses, and learns to fall ahead"
+    why = (
+        f"with more than {MANY} hinges for each leg it falls in most poses, and learns to fall "
+        "forward"
+    )
     return settings, (what, "medium", why)
 
 
@@ -183,5 +186,5 @@ def few_feet(body: Traits) -> tuple[Settings, Choice]:
         f"{STARTS} starts, others in each of {GENERATIONS} generations at most, with "
         f"torques up to {LATE} step late; small mutations; staying up counts {ALIVE:g}, {speed}"
     )
-    why = "on one foot or two it falls unless it walks: more disturbed starts, and first of all to stay up"
+    why = "on one foot or two it falls unless it walks: more disturbed starts, and to stay up first"
     return settings, (what, "medium", why)
