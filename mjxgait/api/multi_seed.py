@@ -41,14 +41,14 @@ def evolve_zoo(
     with interruptible() as interrupted, scheduler_at(cluster, output.progress) as scheduler:
         begin()
         with locked(zoo):
-            told, seeds = interrupted.is_set, read_seeds(zoo)
+            stopped, seeds = interrupted.is_set, read_seeds(zoo)
             folders = seeds.folders(zoo)
             creature, config = open_run(folders[0])
             again = command("train", "--resume", zoo, run=folders[0])
             kept, together = config.keep_every, seeds.together
             rows = Rows(creature, folders, screen.evolved, keep_every=kept, together=together)
-            ended = rows.to_the_end(scheduler, told) is not None
-            ended = ended and examine(zoo, folders, again, screen.examined, told)
+            ended = rows.to_the_end(scheduler, stopped) is not None
+            ended = ended and examine(zoo, folders, again, screen.examined, stopped)
     if not ended:
         output.console.print(f"interrupted; go on with: {again}")
         return False

@@ -175,12 +175,12 @@ def gather(request: RepertoireRequest, output: Output) -> tuple[Path, bool]:
         if plan is not None:
             begin(plan)
         with locked(folder):
-            creature, told = open_run(folder / grid.cells[0].name)[0], interrupted.is_set
+            creature, stopped = open_run(folder / grid.cells[0].name)[0], interrupted.is_set
             character = _character(request.onto, creature)
-            ended = evolve(folder, creature, grid, scheduler, screen.evolved, told)
+            ended = evolve(folder, creature, grid, scheduler, screen.evolved, stopped)
             walks = [folder / cell.name for cell in grid.cells]
             again = f"mjxgait repertoire --resume {folder}"
-            ended = ended and examine(folder, walks, again, screen.examined, told)
+            ended = ended and examine(folder, walks, again, screen.examined, stopped)
     if not ended:
         output.console.print(f"interrupted; go on with: mjxgait repertoire --resume {folder}")
         return folder, False
@@ -317,9 +317,9 @@ def _leave(
         console.print(f"half way between neighbours {walking} of {len(between)} walk")
     changed = changes(folder, creature, grid, found, screen.changed) if between else []
     if changed:
-        told = sum(change.share == 1 for change in changed)
+        always = sum(change.share == 1 for change in changed)
         console.print(
-            f"when commanded to change to a neighbouring walk, it always succeeds in {told} of "
+            f"when commanded to change to a neighbouring walk, it always succeeds in {always} of "
             f"{len(changed)} changes; from {np.mean([c.share for c in changed]):.0%} of the moments"
         )
     if loops := clips_of(folder, found, options.rate):

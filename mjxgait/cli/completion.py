@@ -41,5 +41,5 @@ def completion_command(arguments: Sequence[str]) -> int:
 def _subcommand(name: str) -> Any:
     module = importlib.import_module(f"mjxgait.cli.{name + '_' * keyword.iskeyword(name)}")
     options = getattr(module, f"{name.capitalize()}Options")
-    told = tyro.conf.subcommand(name, description=COMMANDS[name].what, prefix_name=False)
-    return Annotated[options, told]
+    named = tyro.conf.subcommand(name, description=COMMANDS[name].what, prefix_name=False)
+    return Annotated[options, named]

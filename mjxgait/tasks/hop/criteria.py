@@ -227,10 +227,10 @@ class LimboCriteria(HopCriteria):
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """Report of a hop, and the least clearance."""
-        told = super().report(whole, config)
+        reported = super().report(whole, config)
         least = _least(whole)
         bar = f"a bar {config.limbo.height:g} m high {'cleared' if least > 0 else 'touched'}"
-        return told | {"clearance": least, "summary": f"{told['summary']}; {bar}"}
+        return reported | {"clearance": least, "summary": f"{reported['summary']}; {bar}"}
 
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature

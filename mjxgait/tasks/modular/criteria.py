@@ -125,10 +125,10 @@ class ModularCriteria(StaysUp, abc.ABC):
         It fails if the episode ended before anything counted.
         """
         seconds = champion.origin.get("nominal", {}).get("seconds", np.inf)
-        told = self.promise(champion, seconds, config)
+        promised = self.promise(champion, seconds, config)
         window = whole.window(self.since(champion, config), seconds)
         done = self.done(window) if len(window.trunk_pos) > 1 else np.nan
-        change = abs(done / told - 1) if told > 0 else np.nan
+        change = abs(done / promised - 1) if promised > 0 else np.nan
         again = at_most("change", change, self.wanted(config).again)
         return (Criterion(10, "as in evolution", (again,)),)
 

@@ -125,11 +125,11 @@ class WalkCriteria(StaysUp):
         """See `AcceptanceCriteria`."""
         whole = unrolled(whole, self.wish)
         window = whole.window(config.warmup)
-        told = describe(window, config.gait.clearance) | {"sides": sides(window)}
+        described = describe(window, config.gait.clearance) | {"sides": sides(window)}
         if self.wish:
-            told |= {"asked": self.wish, "posture": posture(window)}
+            described |= {"asked": self.wish, "posture": posture(window)}
         found = {"obstacle": obstacle(whole, config)}
-        return told | found | {"summary": f"{told['gait']}, {told['speed']:.2f} m/s"}
+        return described | found | {"summary": f"{described['gait']}, {described['speed']:.2f} m/s"}
 
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature

@@ -62,7 +62,7 @@ def stepped(falls: Footfalls, before: WalkStats, after: WalkStats) -> Footfalls:
     on = landed * after.foot_down * (after.swinging == 0)
     passed = jnp.where(falls.middle[0] > 0, middle[0] - falls.middle[0], 0.0)
     period = jnp.where(rose[0], passed, falls.period)
-    told = rose & (period > 0)
+    counts = rose & (period > 0)
     angle = 2 * jnp.pi * (middle - middle[0]) / jnp.maximum(period, 1.0)
     return Footfalls(
         landed=landed,
@@ -70,9 +70,9 @@ def stepped(falls: Footfalls, before: WalkStats, after: WalkStats) -> Footfalls:
         when=jnp.where(rose, 0.0, falls.when + on * now),
         middle=middle,
         period=period,
-        cosine=falls.cosine + jnp.where(told, jnp.cos(angle), 0.0),
-        sine=falls.sine + jnp.where(told, jnp.sin(angle), 0.0),
-        stances=falls.stances + told,
+        cosine=falls.cosine + jnp.where(counts, jnp.cos(angle), 0.0),
+        sine=falls.sine + jnp.where(counts, jnp.sin(angle), 0.0),
+        stances=falls.stances + counts,
     )
 
 
@@ -160,12 +160,14 @@ def target_updated(
     )
 
 
-def along(before: TargetStats, after: TargetStats, told: jax.Array, half_time: int) -> TargetStats:
+def along(
+    before: TargetStats, after: TargetStats, commanded: jax.Array, half_time: int
+) -> TargetStats:
     """Return `after` with distances along the commanded heading [] in rad.
 
     half_time: step.
     """
-    ahead, left = jnp.cos(told), jnp.sin(told)
+    ahead, left = jnp.cos(commanded), jnp.sin(commanded)
     x, y = after.trunk - before.trunk
     forward = before.forward + x * ahead + y * left
     early = after.steps <= half_time
@@ -174,7 +176,7 @@ def along(before: TargetStats, after: TargetStats, told: jax.Array, half_time: i
         forward=forward,
         left=before.left - x * left + y * ahead,
         forward_half=jnp.where(early, forward, before.forward_half),
-        heading=wrapped(after.heading - told),
+        heading=wrapped(after.heading - commanded),
     )
 
 
