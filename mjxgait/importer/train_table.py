@@ -166,7 +166,7 @@ def few_feet(body: Traits) -> tuple[Settings, Choice]:
         fitness |= {"speed": LEAPING, "hardening": RISES}
         weights["airborne"] = 0.0
         speed = f"{LEAPING:g} body lengths/s, in the air for free; disturbances that grow"
-    settings = {
+    settings: Settings = {
         "controller": {"interpolation": body.steps_between_poses(BRISK)},
         # An undisturbed trial says little about robustness: evaluate all in all trials.
         "rollout": {
