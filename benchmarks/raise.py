@@ -23,7 +23,6 @@ on the plain floor, up to the fall if there is one. Columns:
 """
 
 import argparse
-import copy
 import dataclasses
 import json
 import sys
@@ -167,22 +166,11 @@ def bumps(
     ]
 
 
-def sloping(creature: Creature, angle: float) -> Creature:
-    """Return the creature on ground that rises forward by `angle` rad; gravity is tilted instead."""
-    model = copy.copy(creature.model)
-    forward = (creature.frame.stand_rot @ creature.frame.forward) * [1.0, 1.0, 0.0]
-    forward /= np.linalg.norm(forward)
-    model.opt.gravity[:] = model.opt.gravity[2] * (
-        np.sin(angle) * forward + [0.0, 0.0, np.cos(angle)]
-    )
-    return dataclasses.replace(creature, model=model)
-
-
 def slopes(creature: Creature, champion: Champion, starts: Starts, sign: int) -> dict[str, Any]:
     """Try ever steeper slopes, up to the first that too few manage."""
     managed, steepest = {}, 0.0
     for degrees in SLOPES:
-        outcome = simulate(sloping(creature, sign * np.radians(degrees)), champion, starts, SECONDS)
+        outcome = simulate(creature, champion, sloping(creature, starts, sign * degrees), SECONDS)
         share = float(
             (outcome.stayed_up & (outcome.travel[:, 0] > creature.frame.body_length)).mean()
         )
@@ -191,6 +179,11 @@ def slopes(creature: Creature, champion: Champion, starts: Starts, sign: int) ->
             break
         steepest = degrees
     return {"degrees": steepest, "tried": managed}
+
+
+def sloping(creature: Creature, starts: Starts, degrees: float) -> Starts:
+    rise = np.radians(degrees) * creature.frame.start_axes[0][:2]
+    return dataclasses.replace(starts, slope=np.tile(rise, (len(starts), 1)))
 
 
 def even_friction(starts: Starts) -> Starts:

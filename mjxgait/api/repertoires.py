@@ -44,7 +44,8 @@ class RepertoireRequest:
     their places in a blend space (docs/guide/repertoire.md).
 
     Attributes:
-      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF, URDF, BVH, GLB).
+      env: Name of a shipped creature, path of a creature folder, or a model file
+        (MJCF, URDF, xacro, BVH or GLB).
       speeds: Speeds: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
       turns: Turn rates in degrees per second, each to both sides; straight on is always included.
       gait: Gait of all walks; see `mjxgait train --help`.

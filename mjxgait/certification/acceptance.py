@@ -144,7 +144,7 @@ def promising(
 
 
 class WithoutTargets:
-    """Implementation of `AcceptanceCriteria`: for a task without targets, on land, with fixed goals.
+    """`AcceptanceCriteria` of a task without targets, on land, with fixed goals.
 
     drag, pushed, by_pushes, grown, leaps, revision, worth: see `AcceptanceCriteria`.
     """

@@ -109,7 +109,8 @@ COMMON = (
 """Options that `--help` shows, besides `--seed`; `--help-all` shows all."""
 SHORT = f"""Evolve a walk for a creature.
 
-You may name the creature first: `mjxgait train crab`. The run folder gets the champion, its certificate and its plots.
+You may name the creature first: `mjxgait train crab`. The run folder gets the champion, its
+certificate and its plots.
 `mjxgait train {HELP_ALL}` lists further options and every key of the config; --controller and --task
 select another controller and task (docs/guide/your-own-task.md).
 """

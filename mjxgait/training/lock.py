@@ -73,8 +73,8 @@ def running(run: Path) -> str | None:
 
 def why_empty(run: Path) -> str:
     """Return why a run has no results yet."""
-    if who := running(run):
-        return f"it runs now ({who}) and has not done its first generation"
+    if writer := running(run):
+        return f"it runs now ({writer}) and has not done its first generation"
     return "the run ended before its first generation was done"
 
 
@@ -95,8 +95,10 @@ def _acquired(folder: Path) -> BinaryIO:
                 file.write(json.dumps(own).encode())
                 file.flush()
             return file
-    who = _holder(path) or "another process"
-    raise UserError(f"{folder}: {who} works on it now; wait until that has ended, or end it first")
+    holder = _holder(path) or "another process"
+    raise UserError(
+        f"{folder}: {holder} works on it now; wait until that has ended, or end it first"
+    )
 
 
 def _try(file: BinaryIO, shared: bool = False) -> bool:

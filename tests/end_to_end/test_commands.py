@@ -191,7 +191,7 @@ def test_each_seed_of_a_multi_seed_run_gets_a_certificate(
 def test_tries_go_on_until_a_run_is_certified(
     certified: int | None, tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch
 ):
-    """Of three, from seed 3 on; `certified`: the first seed whose run is, if any."""
+    """Of three, from seed 3 on. certified: first seed with a certified run, if any."""
     monkeypatch.setattr(Run, "certified", property(lambda run: _seed(run.folder) == certified))
     given = ("--env", STOOL, "--config", small_settings(tmp_path), "--generations", 1)
     said = said_by(
