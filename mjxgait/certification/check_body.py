@@ -226,7 +226,12 @@ class _Body:
                 turned = parts[1][partner] @ base[1][partner].T
                 image_turned = image[1][j] @ base_image[1][j].T
                 angle = np.linalg.norm(flip @ turned @ flip - image_turned) / np.sqrt(2)
-                away = np.linalg.norm(flip @ parts[0][partner] - image[0][j])
+                apart = flip @ parts[0][partner] - image[0][j]
+                if partner != j and self.joints[j].type[0] == mujoco.mjtJoint.mjJNT_HINGE:
+                    # A hinge is a line: its anchor may lie anywhere along its axis. A left and a
+                    # right knee share a line, so this does not hold for a joint and itself.
+                    apart -= (apart @ image[2][j]) * image[2][j]
+                away = np.linalg.norm(apart)
                 if angle > LIKENESS or away > LIKENESS * creature.frame.hip_height:
                     raise UserError(
                         f'{creature.name}: joint "{self.names[j]}" does not mirror '
@@ -234,8 +239,9 @@ class _Body:
                         f"it is {away:.3g} m and {angle:.2g} rad off; settle it in [mirror] pairs"
                     )
 
-    def _parts(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Place of each joint [J, 3], m from the trunk; rotation [J, 3, 3] of the body it moves.
+    def _parts(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Place of each joint [J, 3], m from the trunk; rotation [J, 3, 3] of the body it moves;
+        its axis [J, 3].
 
         Joints are compared, not centres of mass, which may differ between the sides.
         """
@@ -243,8 +249,9 @@ class _Body:
         qpos[[j.qposadr[0] for j in self.joints]] = pose
         self.pose(qpos)
         moved = [j.bodyid[0] for j in self.joints]
-        place = self.data.xanchor[[j.id for j in self.joints]] - self.data.xpos[self.trunk.id]
-        return place, self.data.xmat[moved].reshape(-1, 3, 3).copy()
+        ids = [j.id for j in self.joints]
+        place = self.data.xanchor[ids] - self.data.xpos[self.trunk.id]
+        return place, self.data.xmat[moved].reshape(-1, 3, 3).copy(), self.data.xaxis[ids].copy()
 
     def setting(self, joint: str, key: str, default: object = None) -> Any:
         """Setting of a joint: that of all joints, overridden by matching exceptions in order."""

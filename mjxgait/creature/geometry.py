@@ -156,7 +156,8 @@ def mirror_map(
       slides: [J] whether the joint is a slide.
       carried: [J, 3] m, in the same frame: the centre of mass of all that hangs on the joint. It
         distinguishes a left and a right joint with the same anchor and axis.
-      tolerance: m, largest distance of a mirrored anchor from its partner's.
+      tolerance: m, largest distance of a mirrored anchor from its partner's, or of a mirrored hinge
+        from its partner and of what they carry.
 
     Returns:
       partner [J] and sign [J]: joint `j` of the mirror image moves as `sign[j] * partner[j]`.
@@ -193,8 +194,13 @@ def mirror_images(
         for places in (anchors, carried)
     )
     parallel = turned @ axes.T
+    apart = (anchors * mirror)[:, None] - anchors[None]
+    # A hinge may have its anchor anywhere on its line: servos on one side have it on that side.
+    # Left and right knees share a line, so it counts only where what hangs on them is mirrored too.
+    along = (apart * axes).sum(-1, keepdims=True) * axes
+    one_line = ~slides & (np.linalg.norm(apart - along, axis=-1) < tolerance) & (load < tolerance)
     fits = (
-        (distance < tolerance)
+        ((distance < tolerance) | one_line)
         & (np.abs(parallel) > 1 - 0.01 * slack)
         & (slides[:, None] == slides[None])
     )

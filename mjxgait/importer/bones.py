@@ -9,6 +9,7 @@ import math
 import mujoco
 import numpy as np
 
+from mjxgait.creature.geometry import rotation
 from mjxgait.errors import listed
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.shapes import HIDDEN, Bar, bar, mark
@@ -44,8 +45,26 @@ def add_bones(spec: mujoco.MjSpec, notes: Notes) -> None:
 
 def _rigid(body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
     """Return a moving body and the bodies fixed to it."""
-    fixed = [child for child in body.bodies if not child.joints]
-    return [body, *itertools.chain.from_iterable(map(_rigid, fixed))]
+    return [part for part, _ in _placed(body, np.eye(4))]
+
+
+def _placed(body: mujoco.MjsBody, place: np.ndarray) -> list[tuple[mujoco.MjsBody, np.ndarray]]:
+    """Return the bodies of `_rigid`, each with its transform [4, 4]; place: that of `body`."""
+    below = (_placed(c, place @ _transform(c)) for c in body.bodies if not c.joints)
+    return [(body, place), *itertools.chain.from_iterable(below)]
+
+
+def _transform(body: mujoco.MjsBody) -> np.ndarray:
+    """Return the transform [4, 4] from a body's frame to its parent's."""
+    transform = np.eye(4)
+    transform[:3, :3], transform[:3, 3] = rotation(body.quat), body.pos
+    return transform
+
+
+def _moved(transform: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Return a point [3] of a body's frame in the frame that its transform leads to."""
+    moved: np.ndarray = transform[:3, :3] @ point + transform[:3, 3]
+    return moved
 
 
 def _mass(body: mujoco.MjsBody) -> float:
@@ -58,11 +77,19 @@ def _has_shape(body: mujoco.MjsBody) -> bool:
 
 def _bone(body: mujoco.MjsBody) -> Bar | None:
     """Return the capsule of a part; of the trunk between the joints that are farthest apart."""
-    ends = [child.pos + child.joints[0].pos for child in body.bodies if child.joints]
+    parts = _placed(body, np.eye(4))
+    ends = [
+        _moved(place @ _transform(child), child.joints[0].pos)
+        for part, place in parts
+        for child in part.bodies
+        if child.joints
+    ]
+    middle = sum(part.mass * _moved(place, part.ipos) for part, place in parts if part.mass)
+    middle /= _mass(body)
     start = body.joints[0].pos
-    pairs = [(start, end) for end in ends or [2 * body.ipos - start]]
+    pairs = [(start, end) for end in ends or [2 * middle - start]]
     if body.joints[0].type == mujoco.mjtJoint.mjJNT_FREE:
-        pairs = list(itertools.combinations(ends, 2)) or [(body.ipos, body.ipos)]
+        pairs = list(itertools.combinations(ends, 2)) or [(middle, middle)]
     a, b = max(pairs, key=lambda two: float(np.linalg.norm(two[1] - two[0])))
     length = float(np.linalg.norm(b - a))
     if ends and length < SHORT:

@@ -1,5 +1,7 @@
 """Cleaning of MJCF files for MuJoCo's reader: includes are read, meshes loaded, much is dropped."""
 
+import itertools
+import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -42,6 +44,8 @@ Sites stay, because tendons, actuators and equality constraints refer to them.
 """
 COMPILER_FOLDERS = ("meshdir", "texturedir", "assetdir")
 MOST_COPIES = 64
+FEW_RANGES = 3
+"""Joints with limits from which on their sizes show in which unit they are."""
 
 
 def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None:
@@ -53,6 +57,7 @@ def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None
     tree = source.tree
     _include(tree, path, places, [0, 0])
     folders = _compiler(tree)
+    _radians(tree, notes)
     source.poses = [
         n
         for n in (
@@ -120,6 +125,19 @@ def _compiler(tree: ET.Element) -> list[str]:
         for key in ("discardvisual", "fusestatic", "strippath", "usethread"):
             compiler.attrib.pop(key, None)
     return folders
+
+
+def _radians(tree: ET.Element, notes: Notes) -> None:
+    """State that angles are in radians if the file does not say, and no joint could move else."""
+    if any("angle" in compiler.attrib for compiler in tree.findall("compiler")):
+        return
+    joints = [joint for joint in tree.iter("joint") if joint.get("type") != "slide"]
+    stated = [numbers(joint.get("range")) or [] for joint in joints]
+    turns = [numbers(element.get("euler")) or [] for element in tree.iter()]
+    angles = [abs(angle) for angle in itertools.chain(*stated, *turns)]
+    if sum(map(bool, stated)) >= FEW_RANGES and max(angles) <= math.tau:
+        tree.append(ET.Element("compiler", angle="radian"))
+        notes.change("angles read as radians", "in degrees no joint could move by more than 6.3")
 
 
 def _drop_inner(tree: ET.Element, notes: Notes) -> None:

@@ -14,14 +14,20 @@ FRONT_WORDS, BACK_WORDS = (
 )
 FRONT_CORNERS, BACK_CORNERS = (
     {"fl", "fr", "lf", "rf"},
-    {"hl", "hr", "rl", "rr", "bl", "br", "lh", "rh", "lb", "rb"},
+    {"hl", "hr", "rl", "rr", "bl", "br", "lh", "rh", "lb", "rb", "lr"},
+)
+LEFT_WORDS, RIGHT_WORDS = (
+    {"left", "l", "fl", "lf", "ml", "lm", "hl", "lh", "rl", "lr", "bl", "lb"},
+    {"right", "r", "fr", "rf", "mr", "rm", "hr", "rh", "rr", "br", "rb"},
 )
 """Whole words of a name, as between underscores."""
+ASKEW = 0.5
+"""Largest share of the way between the sides along one axis that may lie along the other."""
 CLEARLY, MOSTLY = 1.1, 2.0
 """Ratio of the foot swings along the two axes from which the larger one is the walking axis.
 
-The first holds where symmetry does not separate the axes, the second where it speaks for the other
-axis.
+The first holds where symmetry does not separate the axes, the second where it, or the names of left
+and right parts, speak for the other axis.
 """
 SHANK = 0.25
 """Share of a leg's length from which its last part is a shank, not a foot."""
@@ -29,6 +35,8 @@ ROUGHLY = 5.0
 """Factor on the usual tolerance for nearly mirrored bodies."""
 MOST_ALONE = 0.25
 """Share of the joints that may have no mirror image in a body that still counts as symmetric."""
+SIDES = "the names of left and right parts"
+"""Evidence for a direction, in words."""
 WIDEST = 1.4
 """rad, largest hinge range that counts: a leg swings no farther in a stride."""
 FORWARDS = {
@@ -61,7 +69,7 @@ def find_forward(
         "forward",
         name,
         "medium" if sure == "high" and not evidence else sure,
-        why + (f"; {evidence}" if evidence else ""),
+        why + (f"; {evidence}" if evidence not in ("", why) else ""),
     )
     return FORWARDS[name]
 
@@ -78,6 +86,8 @@ def _axis(kinematics: KinematicModel, q: np.ndarray) -> tuple[str, Confidence, s
     farther = max(along_x, along_y) / max(min(along_x, along_y), 1e-9)
     swung = f"the hinges swing the feet {min(farther, 99):.1f} times as far along {name}"
     if alike["x"] == alike["y"]:
+        if farther <= MOSTLY and (facing := _faces(kinematics)) is not None:
+            return ("x", "y")[int(np.abs(facing).argmax())], "high", SIDES
         if farther > CLEARLY:
             return name, "high" if alike["x"] else "medium", swung
         if alike["x"]:
@@ -118,6 +128,9 @@ def _front(kinematics: KinematicModel, xpos: np.ndarray, axis: np.ndarray) -> tu
         score += _named_front(body.name) * float((at - xpos[0]) @ axis)
     if abs(score) > 1e-3:
         return int(np.sign(score)), "the names of front and rear parts"
+    facing = _faces(kinematics)
+    if facing is not None and facing @ axis:
+        return int(facing @ axis), SIDES
     if len(kinematics.feet) > 2:
         return 1, ""
     # Toes reach forward from the ankle; a leg's last part that is a shank hangs back from the knee.
@@ -138,10 +151,37 @@ def _front(kinematics: KinematicModel, xpos: np.ndarray, axis: np.ndarray) -> tu
     return 1, ""
 
 
+def _faces(kinematics: KinematicModel) -> np.ndarray | None:
+    """Forward [3] by the names of left and right parts; None if they do not say it."""
+    sides = np.array([_named_left(body.name) for body in kinematics.bodies])
+    if not (sides > 0).any() or not (sides < 0).any():
+        return None
+    places = kinematics.data.xpos[1:]
+    left = places[sides > 0].mean(0) - places[sides < 0].mean(0)
+    ahead = np.array([left[1], -left[0], 0.0])
+    near, far = np.sort(np.abs(ahead[:2]))
+    if near > ASKEW * far or far < 1e-3:
+        return None
+    faces: np.ndarray = np.where(np.abs(ahead) == far, np.sign(ahead), 0.0)
+    return faces
+
+
+def _named_left(name: str) -> int:
+    """Return 1 for the name of a left part, -1 for a right one, else 0."""
+    name = name.lower()
+    words = _words(name)
+    left = "left" in name or bool(words & LEFT_WORDS)
+    return left - ("right" in name or bool(words & RIGHT_WORDS))
+
+
+def _words(name: str) -> set[str]:
+    return set(re.split(r"[^a-z]+", name))
+
+
 def _named_front(name: str) -> int:
     """Return 1 for the name of a front part, -1 for a rear one, else 0."""
     name = name.lower()
-    words = set(re.split(r"[^a-z]+", name))
+    words = _words(name)
     front = any(w in name for w in FRONT_WORDS) or bool(words & FRONT_CORNERS)
     back = any(w in name for w in BACK_WORDS) or bool(words & BACK_CORNERS)
     return front - back
@@ -260,9 +300,12 @@ def _mirrors(
     trial = q + np.random.default_rng(1).uniform(-0.3, 0.3, len(q))
     kinematics.pose(trial)
     anchors = kinematics.data.xanchor[1:] - kinematics.data.xpos[1]
+    axes = kinematics.data.xaxis[1:].copy()
     kinematics.pose(sign * trial[partner])
     image = kinematics.data.xanchor[1:] - kinematics.data.xpos[1]
-    off = np.linalg.norm(image[partner] * [1, -1, 1] - anchors, axis=1)
+    apart = image[partner] * [1, -1, 1] - anchors
+    # Of a hinge's anchor only its line counts.
+    off = np.linalg.norm(apart - (apart * axes).sum(1, keepdims=True) * axes, axis=1)
     most = 0.05 * float(np.ptp(anchors, axis=0).max()) + 1e-6
     lone = (partner == np.arange(len(q))) & (np.abs(anchors[:, 1]) > most)
     return bool(off[~lone].max(initial=0.0) < most)

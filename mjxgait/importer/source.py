@@ -1,6 +1,7 @@
 """Reading of a model file and its references.
 
-The file is untrusted: only its folder and the search paths are read, and everything is bounded.
+The file is untrusted: only its folder, its package and the search paths are read, and everything
+is bounded.
 """
 
 import dataclasses
@@ -29,6 +30,10 @@ MOST_ELEMENTS, MOST_ATTRIBUTES, MOST_DEPTH, MOST_INCLUDES = 20_000, 100, 200, 40
 MuJoCo's own elements have up to 40 attributes.
 """
 READABLE_MESHES = (".stl", ".obj", ".msh")
+MODEL_FOLDERS = frozenset(("mjcf", "model", "models", "robots", "sdf", "urdf", "xml", "xmls"))
+"""Names of a folder for models inside a package that holds their meshes in another folder."""
+PACKAGE_DEPTH = 3
+"""Folders above a model's in which its package is looked for."""
 
 
 @dataclasses.dataclass
@@ -61,11 +66,15 @@ class Source:
 
 
 class Places:
-    """Folders that may be read: the model's and the search paths, also for `package://` paths."""
+    """Folders that may be read: the model's, its package's and the search paths.
+
+    They also resolve `package://` paths.
+    """
 
     def __init__(self, model: Path, search: Sequence[Path]) -> None:
         self.home = model.resolve().parent
-        self.roots = [self.home, *(folder.resolve() for folder in search)]
+        package = _package(self.home)
+        self.roots = [self.home, *(folder.resolve() for folder in search), *package]
 
     def find(self, reference: str, folders: Sequence[str] = ("",)) -> Path | None:
         """Return the referenced file; None if it is missing or outside the readable folders."""
@@ -90,6 +99,17 @@ class Places:
             except (OSError, RuntimeError, ValueError):
                 continue
         return None
+
+
+def _package(home: Path) -> list[Path]:
+    """Return the folder of the package that a model's folder belongs to, or nothing.
+
+    A ROS package has a `package.xml`. Without one, models lie in a folder such as `urdf` beside one
+    for their meshes.
+    """
+    near = [home, *home.parents][: PACKAGE_DEPTH + 1]
+    marked = [folder for folder in near if (folder / "package.xml").is_file()]
+    return marked[:1] or [folder for folder in near[1:2] if home.name.lower() in MODEL_FOLDERS]
 
 
 def parse_xml(path: Path) -> ET.Element:
@@ -154,7 +174,7 @@ def load_mesh(
     if path is None:
         notes.change(
             f'mesh "{reference}" dropped',
-            "not found in the model's folder or a search path (name more with --search)",
+            "not found in the model's folder, its package or a search path (name more with --search)",
         )
         return None
     size = path.stat().st_size

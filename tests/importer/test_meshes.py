@@ -99,6 +99,46 @@ def test_a_mesh_that_cannot_be_read_is_named_as_in_the_model(tmp_path: Path):
     assert 'shapes dropped "meshes/trunk.dae"' in imported.notes.text()
 
 
+@pytest.mark.parametrize(
+    ("model", "reference"),
+    [("urdf", "package://biped/meshes/"), ("urdf", "../meshes/"), ("deep/down", "../../meshes/")],
+)
+def test_meshes_beside_a_package_s_models_are_found(tmp_path: Path, model: str, reference: str):
+    """The layout of ROS packages: my_robot/urdf, my_robot/meshes, my_robot/package.xml."""
+    (tmp_path / model).mkdir(parents=True)
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "trunk.dae").write_bytes(written("dae"))
+    if model != "urdf":
+        (tmp_path / "package.xml").touch()
+    text = BIPED.replace("package://biped/meshes/", reference)
+    _, imported = bring(tmp_path / model, text)
+    assert "trunk.dae" not in imported.notes.text()
+
+
+def test_a_mesh_outside_of_the_package_is_not_read(tmp_path: Path):
+    (tmp_path / "robot" / "mine").mkdir(parents=True)
+    (tmp_path / "robot" / "trunk.dae").write_bytes(written("dae"))
+    text = BIPED.replace("package://biped/meshes/", "../")
+    _, imported = bring(tmp_path / "robot" / "mine", text)
+    assert 'mesh "../trunk.dae" dropped' in imported.notes.text()
+
+
+def test_a_trunk_whose_shapes_lie_on_a_link_fixed_to_it_gets_a_capsule(tmp_path: Path):
+    """Many files begin with a link without mass and fix the real trunk to it."""
+    text = re.sub(r"<(visual|collision)>.*?</\1>", "", BIPED)
+    name = re.search(r'<link name="(\w+)">', text)
+    assert name
+    first = (
+        '<link name="nothing"/><joint name="fixed" type="fixed"><parent link="nothing"/>'
+        f'<child link="{name[1]}"/><origin xyz="0 0 0.1" rpy="0 0 0.5"/></joint>'
+    )
+    plain, _ = bring(tmp_path, text)
+    creature, imported = bring(tmp_path, re.sub(r"(<robot[^>]*>)", rf"\1{first}", text))
+    assert "capsules for nothing" in imported.notes.text()
+    sizes = [c.model.geom_size[c.model.geom_bodyid == 1] for c in (plain, creature)]
+    np.testing.assert_allclose(*sizes, rtol=1e-3)
+
+
 def test_parts_without_a_shape_get_capsules_along_their_bones(tmp_path: Path):
     """A body that nobody can see is in no picture, and none of its parts stands in another."""
     text = re.sub(r"<(visual|collision)>.*?</\1>", "", BIPED)

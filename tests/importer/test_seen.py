@@ -81,6 +81,40 @@ def test_corners_are_read_as_whole_words(name, side):
     assert _named_front(name) == side
 
 
+@pytest.mark.parametrize("sides", [("l", "r"), ("Left", "Right")])
+def test_names_of_sides_say_the_front_where_the_body_does_not(tmp_path, sides):
+    """A six-legged body whose legs swing about upright axes is as good along x as along y."""
+    legs = "".join(
+        limb(
+            f"{name}_{row}",
+            (x, -row / 5),
+            f'<joint name="{name}_hip_{row}" axis="0 0 1" range="-60 60"/>'
+            f'<joint name="{name}_lift_{row}" axis="{row} {5 * x} 0" range="-40 40"/>',
+        )
+        for row in (-1, 0, 1)
+        for name, x in zip(sides, (0.2, -0.2), strict=True)
+    )
+    creature, imported = bring(tmp_path, animal(legs))
+    np.testing.assert_allclose(front(creature), [0, -1, 0], atol=1e-6)
+    assert "the names of left and right parts" in imported.notes.text()
+
+
+def test_a_hinge_mirrors_another_wherever_its_anchor_lies_on_its_axis(tmp_path):
+    """Servos whose frames are all on their left: the left hinges lie farther out."""
+    legs = "".join(
+        f'<body name="{name}" pos="0 {y + 0.05} 0"><joint name="{name}_hip" axis="0 1 0" '
+        f'range="-60 60"/><geom type="capsule" fromto="0 -.05 0 0 -.05 -.15" size=".02"/>'
+        f'<body name="{name}_shin" pos="0 0 -.15"><joint name="{name}_knee" axis="0 1 0" '
+        f'range="-70 70"/><geom type="capsule" fromto="0 -.05 0 .1 -.05 -.15" size=".02"/>'
+        "</body></body>"
+        for name, y in (("left", 0.1), ("right", -0.1))
+    )
+    creature, _ = bring(tmp_path, animal(legs))
+    assert creature.mirror is not None
+    assert list(creature.mirror.partner) == [2, 3, 0, 1]
+    check_body(creature)
+
+
 @pytest.mark.usefixtures("a_short_search")
 def test_a_leg_without_a_foot_walks_the_way_its_knee_points(tmp_path):
     """The file's knees bend backward from a front along -x, as those of gym's humanoid from x."""
@@ -92,7 +126,7 @@ def test_a_leg_without_a_foot_walks_the_way_its_knee_points(tmp_path):
             f'<joint axis="1 0 0" name="{name}_roll" range="-30 30"/>',
             f'<joint axis="0 -1 0" name="{name}_knee" range="10 120"/>',
         )
-        for name, y in (("left", 0.1), ("right", -0.1))
+        for name, y in (("one", 0.1), ("other", -0.1))
     )
     creature, imported = bring(tmp_path, animal(legs))
     assert front(creature)[0] == pytest.approx(-1)
@@ -248,3 +282,15 @@ def test_one_leg_swings_widely_in_all_of_its_joints(tmp_path):
     )
     assert span["knee"] > np.radians(70) > span["waist"]
     assert span["hip"] > np.radians(50)
+
+
+@pytest.mark.parametrize(("limit", "reads"), [("-1.2 1.2", "radians"), ("-60 60", "")])
+def test_angles_are_in_radians_where_degrees_would_leave_no_room(tmp_path, limit, reads):
+    """Some files rely on a program that adds <compiler angle="radian">."""
+    legs = "".join(
+        limb(name, at, f'<joint name="{name}" axis="0 1 0" range="{limit}"/>')
+        for name, at in CORNERS.items()
+    )
+    creature, imported = bring(tmp_path, animal(legs).replace('<compiler angle="degree"/>', ""))
+    assert ("angles read as radians" in imported.notes.text()) == bool(reads)
+    assert creature.joints.pose_high.max() > 0.3
