@@ -74,6 +74,20 @@ class ForcedConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class RestartConfig:
+    """A new first population in place of one that has learnt nothing, such as only to stand.
+
+    Attributes:
+      every: generations between looks at the best fitness; 0: never.
+      below: fitness up to which the best has learnt nothing.
+    """
+
+    __pydantic_config__ = STRICT
+    every: Whole = 0
+    below: Finite = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
 class EvolutionConfig:
     """Search; see `mjxgait/evolution/breeding.py` for draws of parents and children.
 
@@ -126,6 +140,7 @@ class EvolutionConfig:
       family: largest share of the population that may descend, mother by mother, from one of the
         first generation: keeps one family from taking over.
       forced: a phase of rapid mutation and immigrants when growth stalls.
+      restart: a new first population in place of one that has learnt nothing.
       islands: several such populations that exchange their best (docs/guide/cluster.md).
     """
 
@@ -163,6 +178,7 @@ class EvolutionConfig:
     lineage: Annotated[bool, SHAPE] = False
     family: Annotated[Fraction, SHAPE] = 1.0
     forced: ForcedConfig = dataclasses.field(default_factory=ForcedConfig)
+    restart: Annotated[RestartConfig, ADDED] = dataclasses.field(default_factory=RestartConfig)
     islands: IslandsConfig = dataclasses.field(default_factory=IslandsConfig)
 
     def __post_init__(self) -> None:

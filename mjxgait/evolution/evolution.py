@@ -22,6 +22,7 @@ from mjxgait.evolution.state import (
     Proposal,
     decided,
     metrics,
+    restarted,
 )
 from mjxgait.evolution.strategy import Normal, SeparableCma
 from mjxgait.evolution.survival import Survival, pooled, together
@@ -132,7 +133,9 @@ class Evolution:
         """Select the survivors, and decide whether the next generation is forced."""
         seeding = self._seeding(state)
         recalled, rounds = self._recalled(state, evaluation)
-        generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
+        # The first generation takes as many calls as its candidates need, any later one a call.
+        waits = seeding & ~self._filled(state) & (state.generation < 0)
+        generation = jnp.where(waits, -1, state.generation + 1)
         pool = pooled(state, proposal, recalled, rounds)
         fitness = self._fitness(pool.genomes, pool.terms, generation)
         again, now = self._again(state)
@@ -145,6 +148,7 @@ class Evolution:
         normal = self._learnt(state, proposal, evaluation, seeding)
         state = dataclasses.replace(state, normal=normal)
         state = decided(self.config, state)
+        state = restarted(self.config.restart, state, complete=~self._seeding(state))
         logged = None
         if self.config.lineage and mothers is not None:
             logged = jnp.where(seeding, NO_MOTHER, mothers)
@@ -226,7 +230,8 @@ class Evolution:
         keys_forced = jax.random.split(key_forced, 2 + self.config.forced.mutations)
         created = self.variation.create(keys_forced[0], self.config.offspring)
         known = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
-        initial = choose(places < self.config.population, known, created)
+        first = (state.generation < 0) & (places < self.config.population)
+        initial = choose(first, known, created)
         bred, child_origin, of_child = self._children(key_children, state)
         mutants, forced_origin, of_mutant = forced(
             keys_forced[1:], self.config, self.variation, state, created
@@ -280,6 +285,8 @@ class Evolution:
             terms=terms,
             outcome=outcome,
             fitness=fitness[kept],
+            born=jnp.full(count, jnp.maximum(generation, 0)),
+            origin=jnp.full(count, int(Origin.INITIAL), jnp.int32),
             seeded=seeded.astype(jnp.int32),
         )
 

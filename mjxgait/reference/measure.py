@@ -60,7 +60,7 @@ class Recording:
     foot_height: [T, N] m, lowest point above the ground.
     touch: [T] whether a part other than feet and permitted geoms touches the ground.
     penetration: [T] m, deepest contact with the floor.
-    body_speed: [T] m/s, centre of mass of the fastest body.
+    body_speed: [T] m/s, centre of mass of the fastest body; the origin of one without mass.
     heading: [T] rad of the trunk, left of the start's forward, without jumps.
     goal: m ahead of the start; 0 if the task has none.
     light: [3] m, place in the world; None if the task has none.

@@ -257,6 +257,10 @@ def _generation(
             with disk_errors(folder):
                 write_champion(champion, experiment.creature, folder / CHAMPION)
         screen.generation(line, experiment.config)
+    if lines and not state.seeded:
+        screen.say(
+            f"Its best has learnt nothing (fitness {state.fitness[0]:.3f}): all is drawn anew."
+        )
     return state
 
 

@@ -17,6 +17,7 @@ from mjxgait.certification import (
 )
 from mjxgait.certification.trials import simulate
 from mjxgait.controllers.key_poses.reference import PoseReference
+from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.reference.layout import start_frame
 from mjxgait.reference.measure import measure
@@ -367,3 +368,20 @@ def test_numbers_that_are_not_finite_are_refused_in_one_sentence(
 def test_the_certification_never_imports_jax():
     code = "import mjxgait.certification, sys; sys.exit(any(name.split('.')[0] in ('jax', 'jaxlib', 'mjx') for name in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_part_without_mass_is_as_fast_as_the_same_part_with_some(tiny, trotter, tmp_path):
+    """MuJoCo computes its centre of mass twice as far out: a foot's speed came out doubled."""
+    text = tiny.files["creature.xml"]
+    leg = text.index(">", text.index('<body name="front_left_lower"')) + 1
+    speeds = []
+    for name, mass in (
+        ("none", ""),
+        ("some", '<inertial pos="0 0 0" mass="1e-6" diaginertia="1e-9 1e-9 1e-9"/>'),
+    ):
+        (tmp_path / name).mkdir()
+        shoe = f'<body name="shoe" pos="0.5 0 -0.5">{mass}</body>'
+        (tmp_path / name / "creature.xml").write_text(text[:leg] + shoe + text[leg:])
+        (tmp_path / name / "creature.toml").write_text(tiny.files["creature.toml"])
+        speeds.append(record(load_creature(tmp_path / name), trotter, 1.0).body_speed.max())
+    np.testing.assert_allclose(*speeds, rtol=1e-2)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjxgait.config.evolution import EvolutionConfig, ForcedConfig
+from mjxgait.config.evolution import EvolutionConfig, ForcedConfig, RestartConfig
 from mjxgait.config.schema import Config
 from mjxgait.config.traced import traced
 from mjxgait.controllers.key_poses.controller import Genome
@@ -414,6 +414,34 @@ def test_the_first_generation_is_the_best_of_the_requested_candidates(growth: fl
     assert np.median(first.fitness) > np.median(
         run(plain, 1, has_curriculum=has_curriculum)[0][0].fitness
     )
+
+
+@pytest.mark.parametrize("growth", [1.2, 2.0, 3.0])
+def test_a_population_that_has_learnt_nothing_is_drawn_anew(growth: float):
+    calls = {1.2: 10, 2.0: 2, 3.0: 1}[growth]
+    again = RestartConfig(every=4)
+    evolution = toy(
+        FLAT, growth=growth, initial_choice=2, restart=again, survival="children", forced=NEVER
+    )
+    states = [state for state, _ in run(evolution, 6 + calls)]
+    before, after = states[4], states[4 + calls]
+    assert [int(state.generation) for state in states] == list(range(6 + calls))
+    assert (np.asarray(before.origin) != Origin.INITIAL).any()
+    assert np.asarray(after.origin == Origin.INITIAL).all()
+    assert (np.asarray(after.born) > 4).all()
+    old, new = (np.asarray(state.genomes.key_poses) for state in (before, after))
+    assert not (old[:, None] == new[None]).all((2, 3)).any()
+    assert (np.asarray(states[5 + calls].origin) != Origin.INITIAL).any(), "then it evolves"
+
+
+@pytest.mark.parametrize(("every", "below"), [(0, 0.0), (3, -1.0)])
+def test_a_population_that_has_learnt_something_goes_on(every: int, below: float):
+    plain, watched = (
+        run(toy(FLAT, restart=restart), 8)[-1][0]
+        for restart in (RestartConfig(), RestartConfig(every, below))
+    )
+    ends = (dataclasses.replace(end, key=jax.random.key_data(end.key)) for end in (plain, watched))
+    jax.tree.map(np.testing.assert_array_equal, *ends)
 
 
 def test_a_nonfinite_individual_loses_and_affects_no_other():

@@ -64,13 +64,14 @@ def test_a_resumed_run_ends_with_the_same_bits(whole: Path, stool: Creature, tmp
 
 
 def test_a_row_of_several_is_the_run_alone(whole: Path, stool: Creature):
+    """But for rounding, which differs between programs (docs/guide/studies.md)."""
     batch = build_batch(stool, [config(seed=3), config()])
     step, states = batch.compile(), batch.place(batch.init())
     while np.max(states.generation) < 6:
         states, _ = step(states)
     alone = read_stored(whole, stool.digest).arrays
     for name, array in by_name(states.normal).items():
-        np.testing.assert_array_equal(array[1], alone[f"normal.{name}"], err_msg=name)
+        np.testing.assert_allclose(array[1], alone[f"normal.{name}"], 1e-4, 1e-6, err_msg=name)
     assert not np.array_equal(states.normal.mean[0], states.normal.mean[1])
 
 
