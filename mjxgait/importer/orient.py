@@ -14,10 +14,10 @@ FRONT_WORDS, BACK_WORDS = (
 )
 FRONT_CORNERS, BACK_CORNERS = (
     {"fl", "fr", "lf", "rf"},
-    {"hl", "hr", "rl", "rr", "bl", "br", "lh", "rh", "lb", "rb", "lr"},
+    {"hl", "hr", "rl", "rr", "bl", "br", "lh", "rh", "lb", "rb"},
 )
 LEFT_WORDS, RIGHT_WORDS = (
-    {"left", "l", "fl", "lf", "ml", "lm", "hl", "lh", "rl", "lr", "bl", "lb"},
+    {"left", "l", "fl", "lf", "ml", "lm", "hl", "lh", "rl", "bl", "lb"},
     {"right", "r", "fr", "rf", "mr", "rm", "hr", "rh", "rr", "br", "rb"},
 )
 """Whole words of a name, as between underscores."""

@@ -75,7 +75,15 @@ def test_forward_is_where_the_hinges_swing_the_feet(tmp_path, axis, forward):
 
 @pytest.mark.parametrize(
     ("name", "side"),
-    [("FL_hip", 1), ("br", -1), ("front_leg", 1), ("hind", -1), ("flesh", 0), ("thigh_rl", -1)],
+    [
+        ("FL_hip", 1),
+        ("br", -1),
+        ("front_leg", 1),
+        ("hind", -1),
+        ("flesh", 0),
+        ("thigh_rl", -1),
+        ("lr_knee", 0),  # the right leg of a humanoid, whose left one is ll
+    ],
 )
 def test_corners_are_read_as_whole_words(name, side):
     assert _named_front(name) == side
