@@ -23,7 +23,7 @@ from mjxgait.importer.meshes import convert
 from mjxgait.importer.source import leave_out
 from mjxgait.processes import python_command, safe_environment
 
-SECONDS, GIGABYTES = 10.0, 1.0
+SECONDS, GIGABYTES = 10.0, 2.0
 """Default limits of processor time in s and memory in GB for compiling a model."""
 PATIENCE = 6.0
 """Seconds to wait per second of processor time, because other programs may use the cores."""

@@ -48,9 +48,9 @@ pytestmark = pytest.mark.slow
 
 @functools.cache
 def imported_model(name: str) -> Imported:
-    """By default settings; once for all tests that look at it."""
+    """By default settings, with the limits of a user's import; once for all tests that look."""
     path, search = model_file(name)
-    return import_model(path, ImportChoices(search=search, apart=False))
+    return import_model(path, ImportChoices(search=search))
 
 
 ALWAYS = {*FALLS, *FEET, *MASS} - {"icub", "apollo", "unitree g1", "solo12", "gym walker2d"}
