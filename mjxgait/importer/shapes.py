@@ -24,6 +24,8 @@ SIZES = {
 """Copied kinds of geoms beside meshes, and how many numbers give the size of each."""
 HIDDEN = 3
 """Group of geoms that are not drawn."""
+LITTLE = 0.5
+"""Share of a part's span below which its drawn shapes are not all of it."""
 MOST_POINTS = 48
 """Most points of a mesh's hull."""
 RINGS = 16
@@ -140,6 +142,26 @@ def copy_geoms(
             low, high = points.min(0), points.max(0)
             geom.type, geom.size = GEOM.mjGEOM_BOX, np.maximum((high - low) / 2, 1e-4)
             geom.pos = pos + rotation(quat) @ (low + high) / 2
+
+
+def reveal(shapes: list[Shape]) -> bool:
+    """Draw a body's solid shapes too if those that are drawn span little of it; return whether.
+
+    Some files draw only the foot of a shin. A body with nothing drawn is left to others.
+    """
+    drawn = [shape for shape in shapes if shape.seen]
+    if not drawn or _span(drawn) >= LITTLE * _span(shapes):
+        return False
+    for shape in shapes:
+        mark(shape.geom, shape.solid, True)
+    return True
+
+
+def _span(shapes: list[Shape]) -> float:
+    """Diagonal in m of the box around some shapes."""
+    low = np.min([shape.points.min(0) - shape.radius for shape in shapes], axis=0)
+    high = np.max([shape.points.max(0) + shape.radius for shape in shapes], axis=0)
+    return float(np.linalg.norm(high - low))
 
 
 def shapes_of(spec: mujoco.MjSpec, body: mujoco.MjsBody, place: int) -> list[Shape]:

@@ -15,7 +15,7 @@ from mjxgait.creature.scale import model_text
 from mjxgait.errors import UserError, listed
 from mjxgait.importer.anatomy import BALL, HINGE, Anatomy
 from mjxgait.importer.notes import Notes, plain_names
-from mjxgait.importer.shapes import HIDDEN, copy_geoms
+from mjxgait.importer.shapes import HIDDEN, copy_geoms, reveal, shapes_of
 
 EMPTY = """
 <mujoco>
@@ -61,6 +61,7 @@ def copy_bodies(model: mujoco.MjModel, ids: list[int], scale: float) -> mujoco.M
             body.inertia = scale**2 * model.body_inertia[b]
             body.ipos, body.iquat = scale * model.body_ipos[b], model.body_iquat[b]
         copy_geoms(spec, body, model, b, scale)
+        reveal(shapes_of(spec, body, 0))
     return spec
 
 

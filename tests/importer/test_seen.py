@@ -302,3 +302,26 @@ def test_angles_are_in_radians_where_degrees_would_leave_no_room(tmp_path, limit
     creature, imported = bring(tmp_path, animal(legs).replace('<compiler angle="degree"/>', ""))
     assert ("angles read as radians" in imported.notes.text()) == bool(reads)
     assert creature.joints.pose_high.max() > 0.3
+
+
+def test_a_shin_of_which_only_the_foot_is_drawn_is_drawn_whole(tmp_path):
+    """Some files draw meshes, and for a shin without one only its foot."""
+    shin = '<geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/></body></body>'
+    foot = '<geom type="sphere" pos="0 0 -.15" size=".021" group="2" contype="0" conaffinity="0"/>'
+    legs = "".join(
+        limb(
+            name,
+            at,
+            f'<joint name="{name}_hip" axis="0 1 0" range="-60 60"/>',
+            f'<joint name="{name}_knee" axis="0 1 0" range="-70 70"/>',
+        ).replace(
+            shin, shin.replace("size", 'group="3" size').replace("</body>", foot + "</body>", 1)
+        )
+        for name, at in CORNERS.items()
+    )
+    creature, _ = bring(tmp_path, animal(legs))
+    model = creature.model
+    drawn = model.geom_rbound[
+        (model.geom_bodyid == model.body("FL_shin").id) & (model.geom_group < 3)
+    ]
+    assert drawn.max() > 0.07
