@@ -291,7 +291,7 @@ TARGETS = (
         "Raise --fitness.wish.weights.gait, or ask for another --gait; natural is an animal's.",
     ),
     Entry(
-        "off the heading it was told (deg)",
+        "off the commanded heading (deg)",
         "It is {v:.0f} degrees off the heading that was asked for; {t:.0f} are allowed.",
         "Ask for slower turns: --turn or --steer.",
     ),

@@ -138,7 +138,11 @@ def four_feet(body: Traits) -> tuple[Settings, Choice]:
         fitness["contact"] = 0.0
         what += "; feet are down that bear weight"
         why += ": its motors are heavier to turn than all of it"
-    return {"fitness": fitness}, (what, "high", why)
+    settings: Settings = {"fitness": fitness}
+    if not body.skeleton:
+        settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
+        what += "; cycles no shorter than an animal's of its mass"
+    return settings, (what, "high", why)
 
 
 def many_hinges(body: Traits) -> tuple[Settings, Choice]:

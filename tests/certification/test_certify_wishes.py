@@ -84,8 +84,8 @@ def test_a_gait_is_identified_by_its_footfalls(phases: tuple[float, ...], name: 
 def test_a_turn_follows_the_commanded_heading():
     turning = on_a_circle(30.0)
     assert missed(turning, turn=30.0) == set()
-    assert "off the heading it was told (deg)" in missed(turning, turn=-30.0)
-    assert "off the heading it was told (deg)" in missed(on_a_circle(30.0, late=20.0), turn=30.0)
+    assert "off the commanded heading (deg)" in missed(turning, turn=-30.0)
+    assert "off the commanded heading (deg)" in missed(on_a_circle(30.0, late=20.0), turn=30.0)
     assert missed(on_a_circle(30.0, late=10.0), turn=30.0) == set()
     # Without the target it is a walk in circles that ends behind its start.
     assert "drift / distance" in missed(turning)

@@ -76,8 +76,10 @@ class WalkCriteria(StaysUp):
     """Implementation of `AcceptanceCriteria`: steady forward strides, like those of an animal."""
 
     verdict = "it walks"
-    revision = 1
-    """Criteria for flicker, buzz, tilt, heading and limping were added."""
+    revision = 2
+    """1: criteria for flicker, buzz, tilt, heading and limping. 2: a part without mass is measured
+    where it is, not where MuJoCo puts its centre of mass.
+    """
 
     def __init__(self, wish: Wish | None = None) -> None:
         self.wish = dict(wish or {})

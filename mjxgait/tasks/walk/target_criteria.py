@@ -132,7 +132,7 @@ def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criter
         )
     if {"turn", "steer"} & set(wish):
         measures.append(
-            at_most("off the heading it was told (deg)", heading_off(window), limits.heading)
+            at_most("off the commanded heading (deg)", heading_off(window), limits.heading)
         )
     for name in found:
         if name in wish:
