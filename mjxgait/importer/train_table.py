@@ -17,8 +17,8 @@ LONG, FIRST = 12.0, 4
 individuals drawn for each of the first population: of fewer, some runs learn only to stand.
 """
 LATE, HASTY = 1, 8.0
-"""Largest torque delay in control steps, which is what first fells such a body in its examination.
-Weight of a hasty stride frequency, twice the default.
+"""Largest torque delay in control steps, which is what first fells a robot in its examination.
+Weight of a hasty stride frequency of bodies that must step, twice the default.
 """
 BRISK = 1.2
 """Target speed of such a body in body lengths per second: slower, it has to stand on one foot."""
@@ -38,6 +38,10 @@ WHIPPED = 4.0
 """Weight of swinging a foot too fast, in body lengths per √(g·h).
 
 Most robots that fail a single criterion fail by the speed of their fastest part, a foot.
+"""
+LEAPS = 9.0
+"""Weight of time in the air, three times the default, of robots on more than two feet: those that
+leap off all feet at once do not begin to walk, and late torques fell them.
 """
 MANY = 6
 """Hinges per leg above which few random poses stand.
@@ -139,9 +143,15 @@ def four_feet(body: Traits) -> tuple[Settings, Choice]:
         what += "; feet are down that bear weight"
         why += ": its motors are heavier to turn than all of it"
     settings: Settings = {"fitness": fitness}
-    if not body.skeleton:
+    if not (body.skeleton or body.bounces):
+        fitness["weights"] |= {"fall": 1.0, "airborne": LEAPS}
         settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
-        what += "; cycles no shorter than an animal's of its mass"
+        settings["rollout"] = {"latency": LATE}
+        settings["evolution"] = {"initial_choice": FIRST}
+        what += (
+            f"; falls and leaps cost, torques come up to {LATE} step late; the best of "
+            f"{FIRST} first individuals each; cycles no shorter than an animal's of its mass"
+        )
     return settings, (what, "high", why)
 
 
@@ -150,7 +160,7 @@ def many_hinges(body: Traits) -> tuple[Settings, Choice]:
     settings, (what, _, _) = four_feet(body)
     settings["fitness"]["weights"] |= {"alive": ALIVE, "frequency": HASTY}
     settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
-    settings["evolution"] = {"sigma": SMALLER}
+    settings.setdefault("evolution", {})["sigma"] = SMALLER
     what += f"; smaller ones, no haste; staying up counts {ALIVE:g}"
     why = (
         f"with more than {MANY} hinges for each leg it falls in most poses, and learns to fall "

@@ -1,5 +1,6 @@
 """Disturbances of criterion 4 that evolution lacks, by settings (docs/reference/certificate.md)."""
 
+import dataclasses
 from pathlib import Path
 
 import pytest
@@ -58,7 +59,8 @@ def test_new_disturbances_of_other_settings():
 
 
 def test_new_disturbances_of_imported_bodies():
-    on_two, _ = few_feet(BIPED)
-    assert on_two["rollout"]["latency"] >= EXAMINED.latency
-    assert not {"masses", "slope"} & set(on_two["rollout"])
-    assert "rollout" not in four_feet(BIPED)[0]
+    for robot in (few_feet(BIPED)[0], four_feet(BIPED)[0]):
+        assert robot["rollout"]["latency"] >= EXAMINED.latency
+        assert not {"masses", "slope"} & set(robot["rollout"])
+    character = dataclasses.replace(BIPED, skeleton=True)
+    assert "rollout" not in four_feet(character)[0]
