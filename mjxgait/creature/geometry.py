@@ -197,8 +197,7 @@ def mirror_images(
     apart = (anchors * mirror)[:, None] - anchors[None]
     # A hinge may have its anchor anywhere on its line: servos on one side have it on that side.
     # Left and right knees share a line, so it counts only where what hangs on them is mirrored too.
-    along = (apart * axes).sum(-1, keepdims=True) * axes
-    one_line = ~slides & (np.linalg.norm(apart - along, axis=-1) < tolerance) & (load < tolerance)
+    one_line = ~slides & (off_axis(apart, axes) < tolerance) & (load < tolerance)
     fits = (
         ((distance < tolerance) | one_line)
         & (np.abs(parallel) > 1 - 0.01 * slack)
@@ -209,6 +208,13 @@ def mirror_images(
     mutual = fits.any(axis=1) & (partner[partner] == places)
     sign = np.sign(parallel[places, partner]).astype(int)
     return np.where(mutual, partner, -1), sign
+
+
+def off_axis(vectors: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Lengths [...] of vectors [..., 3] across axes [..., 3] of length 1."""
+    across = vectors - (vectors * axes).sum(-1, keepdims=True) * axes
+    length: np.ndarray = np.linalg.norm(across, axis=-1)
+    return length
 
 
 WAY_OUT = "evolution knows one creature on a flat floor and nothing else"

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 
+from mjxgait.creature.geometry import off_axis
 from mjxgait.errors import listed
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.notes import Confidence, Notes
@@ -303,9 +304,8 @@ def _mirrors(
     axes = kinematics.data.xaxis[1:].copy()
     kinematics.pose(sign * trial[partner])
     image = kinematics.data.xanchor[1:] - kinematics.data.xpos[1]
-    apart = image[partner] * [1, -1, 1] - anchors
     # Of a hinge's anchor only its line counts.
-    off = np.linalg.norm(apart - (apart * axes).sum(1, keepdims=True) * axes, axis=1)
+    off = off_axis(image[partner] * [1, -1, 1] - anchors, axes)
     most = 0.05 * float(np.ptp(anchors, axis=0).max()) + 1e-6
     lone = (partner == np.arange(len(q))) & (np.abs(anchors[:, 1]) > most)
     return bool(off[~lone].max(initial=0.0) < most)

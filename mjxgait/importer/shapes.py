@@ -144,17 +144,15 @@ def copy_geoms(
             geom.pos = pos + rotation(quat) @ (low + high) / 2
 
 
-def reveal(shapes: list[Shape]) -> bool:
-    """Draw a body's solid shapes too if those that are drawn span little of it; return whether.
+def reveal(shapes: list[Shape]) -> None:
+    """Draw all shapes of a body if those that are drawn span little of it.
 
     Some files draw only the foot of a shin. A body with nothing drawn is left to others.
     """
     drawn = [shape for shape in shapes if shape.seen]
-    if not drawn or _span(drawn) >= LITTLE * _span(shapes):
-        return False
-    for shape in shapes:
-        mark(shape.geom, shape.solid, True)
-    return True
+    if drawn and _span(drawn) < LITTLE * _span(shapes):
+        for shape in shapes:
+            mark(shape.geom, shape.solid, True)
 
 
 def _span(shapes: list[Shape]) -> float:

@@ -249,7 +249,6 @@ class Sight:
         )
         self.spun = np.empty((frames, model.nbody, 6))
         self.inertial, self.middle = (np.empty((frames, model.nbody, 3)) for _ in range(2))
-        self.weightless = model.body_mass == 0
         self.met: list[tuple[np.ndarray, ...]] = []
         self.touch, self.penetration, self.body_speed = (
             np.ones(frames, bool),
@@ -269,9 +268,7 @@ class Sight:
         )
         self.geom_xpos[k], self.geom_xmat[k] = data.geom_xpos, data.geom_xmat
         self.spun[k] = data.cvel
-        # MuJoCo puts the centre of mass of a part without mass anywhere, even outside of it.
-        self.inertial[k] = np.where(self.weightless[:, None], data.xpos, data.xipos)
-        self.middle[k] = data.subtree_com
+        self.inertial[k], self.middle[k] = data.xipos, data.subtree_com
         self._contacts(k)
         self.seen = k + 1
 

@@ -37,6 +37,8 @@ def examined_model(creature: Creature) -> mujoco.MjModel:
     model.opt.tolerance = 1e-8
     # MuJoCo must not silently reset a simulation that blows up.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    # MuJoCo puts the centre of mass of a part without mass twice as far out as the part.
+    model.body_ipos[model.body_mass == 0] = 0.0
     return model
 
 

@@ -259,7 +259,7 @@ def _generation(
         screen.generation(line, experiment.config)
     if lines and not state.seeded:
         screen.say(
-            f"Its best has learnt nothing (fitness {state.fitness[0]:.3f}): all is drawn anew."
+            f"The best fitness, {state.fitness[0]:.3f}, earns nothing: the population is drawn anew."
         )
     return state
 

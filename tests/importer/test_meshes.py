@@ -123,7 +123,7 @@ def test_a_mesh_outside_of_the_package_is_not_read(tmp_path: Path):
     assert 'mesh "../trunk.dae" dropped' in imported.notes.text()
 
 
-def test_a_trunk_whose_shapes_lie_on_a_link_fixed_to_it_gets_a_capsule(tmp_path: Path):
+def test_a_trunk_without_mass_gets_the_capsule_of_the_link_fixed_to_it(tmp_path: Path):
     """Many files begin with a link without mass and fix the real trunk to it."""
     text = re.sub(r"<(visual|collision)>.*?</\1>", "", BIPED)
     name = re.search(r'<link name="(\w+)">', text)

@@ -82,7 +82,7 @@ def test_forward_is_where_the_hinges_swing_the_feet(tmp_path, axis, forward):
         ("hind", -1),
         ("flesh", 0),
         ("thigh_rl", -1),
-        ("lr_knee", 0),  # the right leg of a humanoid, whose left one is ll
+        ("lr_knee", 0),  # the right leg of a humanoid with a left one called ll
     ],
 )
 def test_corners_are_read_as_whole_words(name, side):
@@ -91,7 +91,7 @@ def test_corners_are_read_as_whole_words(name, side):
 
 @pytest.mark.parametrize("sides", [("l", "r"), ("Left", "Right")])
 def test_names_of_sides_say_the_front_where_the_body_does_not(tmp_path, sides):
-    """A six-legged body whose legs swing about upright axes is as good along x as along y."""
+    """A six-legged body with legs about upright axes is as good along x as along y."""
     legs = "".join(
         limb(
             f"{name}_{row}",
@@ -108,7 +108,7 @@ def test_names_of_sides_say_the_front_where_the_body_does_not(tmp_path, sides):
 
 
 def test_a_hinge_mirrors_another_wherever_its_anchor_lies_on_its_axis(tmp_path):
-    """Servos whose frames are all on their left: the left hinges lie farther out."""
+    """All servos have their frames on their left: the left hinges lie farther out."""
     legs = "".join(
         f'<body name="{name}" pos="0 {y + 0.05} 0"><joint name="{name}_hip" axis="0 1 0" '
         f'range="-60 60"/><geom type="capsule" fromto="0 -.05 0 0 -.05 -.15" size=".02"/>'

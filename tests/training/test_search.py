@@ -4,12 +4,14 @@ import dataclasses
 import io
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from helpers import STOOL, made_up_evaluate, said_by, small_config
 from rich.console import Console
 
+from mjxgait.config.evolution import RestartConfig
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.training import loop, stages
@@ -59,6 +61,26 @@ def test_a_resumed_run_ends_with_the_same_bits(whole: Path, stool: Creature, tmp
     train(part, stool, config(), resume=True)
     one, two = (read_stored(run, stool.digest).arrays for run in (whole, part))
     assert "normal.mean" in one
+    for name, array in one.items():
+        np.testing.assert_array_equal(array, two[name], err_msg=name)
+
+
+@pytest.mark.parametrize("search", ["ga", "es"])
+def test_a_run_that_begins_again_is_resumed_with_the_same_bits(
+    search: Literal["ga", "es"], stool: Creature, tmp_path: Path
+):
+    """It stops in the generation after which the population is drawn anew."""
+
+    def again(generations: int) -> Config:
+        plain = config(generations)
+        own: dict[str, Any] = {"search": search, "restart": RestartConfig(every=3, below=1e9)}
+        return dataclasses.replace(plain, evolution=dataclasses.replace(plain.evolution, **own))
+
+    straight = train(tmp_path / "straight", stool, again(5))
+    part = train(tmp_path / "part", stool, again(3))
+    train(part, stool, again(5), resume=True)
+    one, two = (read_stored(run, stool.digest).arrays for run in (straight, part))
+    assert one["born"].min() > 3, "nothing of the first population is left"
     for name, array in one.items():
         np.testing.assert_array_equal(array, two[name], err_msg=name)
 

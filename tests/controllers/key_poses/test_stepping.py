@@ -136,10 +136,13 @@ def test_quadrupeds_and_in_line_feet_do_not_step(tmp_path: Path):
         creature = load_files(import_model(file, choices).files)
         assert not creature.corrections.steps
         usual, own = Config(), resolve_config(creature.settings.train, creature.name)
-        assert own.fitness.speed == usual.fitness.speed
-        assert own.fitness.weights.alive == usual.fitness.weights.alive
+        dear = {"foot_speed": own.fitness.weights.foot_speed, "fall": 1.0, "airborne": 9.0}
+        weights = dataclasses.replace(usual.fitness.weights, **dear)
+        assert own.fitness == dataclasses.replace(usual.fitness, weights=weights)
+        assert own.controller.interpolation >= usual.controller.interpolation
         assert own.evolution.generations == usual.evolution.generations
         assert own.rollout.starts == usual.rollout.starts
+        assert own.rollout.latency == 1
         assert own.rollout.promote == usual.rollout.promote
 
 
