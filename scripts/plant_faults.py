@@ -190,25 +190,25 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=1, help="faults at the same time")
     parser.add_argument("--trust", action="store_true", help="that tests pass without a fault")
     parser.add_argument("--table", type=Path, help="page whose rows of these faults are rewritten")
-    told = parser.parse_args(arguments)
-    known = read_faults(told.list)
-    if unknown := set(told.names) - {fault.name for fault in known}:
+    options = parser.parse_args(arguments)
+    known = read_faults(options.list)
+    if unknown := set(options.names) - {fault.name for fault in known}:
         parser.error(f"no such fault: {', '.join(sorted(unknown))}")
-    faults = [fault for fault in known if not told.names or fault.name in told.names]
+    faults = [fault for fault in known if not options.names or fault.name in options.names]
     try:
         for fault in faults:
-            planted(fault, told.root)
+            planted(fault, options.root)
     except ValueError as error:
         sys.exit(str(error))
     with tempfile.TemporaryDirectory(prefix="faults-jax-") as folder:
-        if not told.trust:
-            check_sound(faults, told.root, Path(folder))
-        findings = _examine_all(faults, told.root, Path(folder), told.jobs)
+        if not options.trust:
+            check_sound(faults, options.root, Path(folder))
+        findings = _examine_all(faults, options.root, Path(folder), options.jobs)
     print(f"\n{table(findings)}")
-    if told.table:
-        old = told.table.read_text(encoding="utf-8") if told.table.exists() else ""
+    if options.table:
+        old = options.table.read_text(encoding="utf-8") if options.table.exists() else ""
         page = table(findings, old, [fault.name for fault in known])
-        told.table.write_text(page + "\n", encoding="utf-8")
+        options.table.write_text(page + "\n", encoding="utf-8")
     caught = sum(finding.caught_by is not None for finding in findings)
     print(f"\n{caught} of {len(findings)} caught")
     return 0 if caught == len(findings) else 1

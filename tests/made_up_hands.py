@@ -36,7 +36,7 @@ class Pretend:
 
 def pretended(recipe: Recipe, job: AdvanceRows) -> Advanced:
     batch = PROGRAMS.batch(recipe)
-    before = job.state or pack(batch.init()).with_arrays(job.planted or {})
+    before = job.state or pack(batch.init()).with_first(job.planted or {})
     rows = len(batch.experiments)
     new = {
         "generation": np.full(rows, job.until, np.int32),

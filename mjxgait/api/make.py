@@ -98,7 +98,8 @@ def train(
       certificate: walks, or anywhere (docs/reference/certificate.md).
       expressions: file of initial programs, for the controller program
         (docs/reference/expressions.md).
-      source: an earlier run; its last population is the first of this one.
+      source: an earlier run, or a folder of several (`mjxgait train --runs`); the last populations
+        are the first of this one.
       seed: of all random numbers.
       tries: the most runs, with seeds from `seed` on, until one is certified; returns the last.
       population: individuals of a generation.
@@ -263,25 +264,34 @@ def evolve(
 ) -> bool:
     """Evolve a run, here or on a cluster; return whether it came to its end.
 
-    source: earlier run; its last population is the first of the new one.
+    source: earlier run, or folder of several; the last populations are the first of the new one.
 
     For the arguments and errors see `training.loop.train` and `distributed.evolve.evolve`.
     """
-    from mjxgait.training.initial import initial_of
+    from mjxgait.experiments.ancestors import evolve_ancestors
+    from mjxgait.experiments.multi_seed import folders_of, is_zoo
+    from mjxgait.training.initial import united
 
+    ancestors = None
+    if config.evolution.ancestors.runs:
+        ancestors = partial(evolve_ancestors, folder, creature, config, screen.say)
     elsewhere = cluster or config.evolution.islands.count > 1
     if source and elsewhere:
         raise UserError(f"--from {source}: not for islands, nor on a cluster")
+    if ancestors and config.evolution.islands.count > 1:
+        raise UserError("islands begin with drawn individuals; give --evolution.ancestors.runs 0")
     if elsewhere:
         from mjxgait.distributed.evolve import evolve as across
 
-        return across(folder, creature, config, screen, resume, generation, cluster, begin)
+        there = resume, generation, cluster, begin
+        return across(folder, creature, config, screen, *there, ancestors)
     from mjxgait.training import loop
 
-    initial = initial_of(source) if source else None
-    return loop.train(
-        folder, creature, config, screen, resume, generation, begin=begin, initial=initial
-    )
+    initial = None
+    if source:
+        initial = united(folders_of(source) if is_zoo(source) else [source])
+    at = resume, generation, None, begin
+    return loop.train(folder, creature, config, screen, *at, initial, ancestors)
 
 
 def used(**named: str | None) -> dict[str, str]:

@@ -32,6 +32,7 @@ def evolve_zoo(
     """
     from mjxgait.distributed.evolve import scheduler_at
     from mjxgait.distributed.rows import Rows
+    from mjxgait.experiments.ancestors import first_genomes
     from mjxgait.training.ended import examine
     from mjxgait.training.loop import interruptible
     from mjxgait.training.stages import prepare_devices
@@ -46,8 +47,16 @@ def evolve_zoo(
             creature, config = open_run(folders[0])
             again = command("train", "--resume", zoo, run=folders[0])
             kept, together = config.keep_every, seeds.together
-            rows = Rows(creature, folders, screen.evolved, keep_every=kept, together=together)
-            ended = rows.to_the_end(scheduler, stopped) is not None
+            first = first_genomes(folders, creature, output.say)
+            rows = Rows(
+                creature,
+                folders,
+                screen.evolved,
+                planted=first,
+                keep_every=kept,
+                together=together,
+            )
+            ended = first is not None and rows.to_the_end(scheduler, stopped) is not None
             ended = ended and examine(zoo, folders, again, screen.examined, stopped)
     if not ended:
         output.console.print(f"interrupted; go on with: {again}")

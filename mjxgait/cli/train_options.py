@@ -32,8 +32,8 @@ class TrainOptions(Verbosity):
         (docs/guide/gaits.md).
       expressions: File of handwritten programs as the start of evolution, for --controller program
         (docs/reference/expressions.md).
-      source: Run folder; its last population is the first of the new run, which may have another
-        task or other settings.
+      source: Run folder, or folder of several (--runs); the last populations are the first of the
+        new run, which may have another task or other settings.
       out: Folder for the run; by default a new one under runs/.
       runs: Number of separate runs side by side, with seeds from --seed on: a folder with a run
         folder each, and a picture of all champions (docs/guide/studies.md).

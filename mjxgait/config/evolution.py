@@ -87,6 +87,34 @@ class RestartConfig:
     below: Finite = 0.0
 
 
+def several(runs: int) -> int:
+    """Return a number of runs; raise ValueError for a single one."""
+    if runs == 1:
+        raise ValueError("give 2 or more, or 0 for none")
+    return runs
+
+
+@dataclasses.dataclass(frozen=True)
+class AncestorsConfig:
+    """Runs of an easier task before this one, whose best individuals begin it (two-step evolution).
+
+    They stay in the run's folder `ancestors`. `train --from` takes their place. Source: Shim, Shin
+    and Kim (2004).
+
+    Attributes:
+      runs: number of them, at least 2; 0: the first individuals are drawn.
+      task: what they evolve for, with the creature's settings for it.
+      population: P of each.
+      generations: number of generations of each.
+    """
+
+    __pydantic_config__ = STRICT
+    runs: Annotated[Whole, pydantic.AfterValidator(several), HOST] = 0
+    task: Annotated[str, HOST] = "swim"
+    population: Annotated[Count, HOST] = 60
+    generations: Annotated[Count, HOST] = 40
+
+
 @dataclasses.dataclass(frozen=True)
 class EvolutionConfig:
     """Search; see `mjxgait/evolution/breeding.py` for draws of parents and children.
@@ -141,6 +169,7 @@ class EvolutionConfig:
         first generation: keeps one family from taking over.
       forced: a phase of rapid mutation and immigrants when growth stalls.
       restart: a new first population in place of one that has learnt nothing.
+      ancestors: runs of an easier task whose best begin this run; not for islands and studies.
       islands: several such populations that exchange their best (docs/guide/cluster.md).
     """
 
@@ -179,6 +208,9 @@ class EvolutionConfig:
     family: Annotated[Fraction, SHAPE] = 1.0
     forced: ForcedConfig = dataclasses.field(default_factory=ForcedConfig)
     restart: Annotated[RestartConfig, ADDED] = dataclasses.field(default_factory=RestartConfig)
+    ancestors: Annotated[AncestorsConfig, ADDED] = dataclasses.field(
+        default_factory=AncestorsConfig
+    )
     islands: IslandsConfig = dataclasses.field(default_factory=IslandsConfig)
 
     def __post_init__(self) -> None:
@@ -186,7 +218,8 @@ class EvolutionConfig:
             raise ValueError("population must be at least 2: crossover needs two parents")
         if round(self.population * (self.growth - 1)) < 1:
             raise ValueError(
-                f"growth = {self.growth} leaves no room for offspring; make it larger than {1 + 1 / self.population:.3g}"
+                f"growth = {self.growth} leaves no room for offspring; make it larger than "
+                f"{1 + 1 / self.population:.3g}"
             )
 
         at_once = not self.unique_children and self.pool != "growing"

@@ -54,6 +54,11 @@ def traced_structure(config: Config) -> jax.tree_util.PyTreeDef:
     return jax.tree.structure(_traced(config))
 
 
+def shape_settings(cls: type) -> tuple[str, ...]:
+    """Return the names of a dataclass's settings that decide the shape of the program."""
+    return tuple(field.name for field, _, role in _fields(cls) if role == SHAPE)
+
+
 def _traced(config: Any) -> Any:
     values = {}
     for field, hint, role in _fields(type(config)):  # type: ignore[arg-type]  # types are hashable

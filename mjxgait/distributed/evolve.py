@@ -20,6 +20,7 @@ from mjxgait.distributed.rows import ChunkedEvaluator
 from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.errors import UserError
 from mjxgait.training import loop
+from mjxgait.training.initial import Initial
 from mjxgait.training.screen import Screen
 
 A_SECOND = 4
@@ -95,11 +96,12 @@ def evolve(
     generation: int | None = None,
     cluster: str | None = None,
     begin: Callable[[], object] = lambda: None,
+    ancestors: Callable[[], Initial | None] | None = None,
 ) -> bool:
     """Start or resume islands, or a run on a cluster; return whether it reached its end.
 
     Args:
-      resume, generation, begin: see `loop.train`.
+      resume, generation, begin, ancestors: see `loop.train`. Islands have no ancestors.
       cluster: address of the cluster that computes it, if not this machine.
 
     Raises:
@@ -113,4 +115,5 @@ def evolve(
         if several:
             return islands.train(folder, creature, config, screen, scheduler, resume, begin)
         evaluator = ChunkedEvaluator(scheduler, creature, config)
-        return loop.train(folder, creature, config, screen, resume, generation, evaluator, begin)
+        at = resume, generation, evaluator, begin
+        return loop.train(folder, creature, config, screen, *at, ancestors=ancestors)

@@ -210,7 +210,7 @@ class Advanced:
 class AdvanceRows(Job[Advanced]):
     """Advance runs side by side to a generation, from a state or from the beginning.
 
-    planted: arrays [B, P, ...] of the initial genomes by name, in place of random ones.
+    planted: arrays [B, N, ...] of the first genomes by name, in place of random ones; N <= P.
     """
 
     state: Packed | None
@@ -233,7 +233,7 @@ class AdvanceRows(Job[Advanced]):
     def _begun(self, batch: Batch) -> EvolutionState:
         if self.state is None and self.planted is None:
             return batch.init()
-        begun = self.state or pack(batch.init()).with_arrays(self.planted or {})
+        begun = self.state or pack(batch.init()).with_first(self.planted or {})
         return begun.state(batch.abstract(), "a state of these runs")
 
 

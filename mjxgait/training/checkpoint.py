@@ -57,6 +57,16 @@ class Packed:
         """Return the state with these arrays replaced."""
         return Packed({**self.arrays, **arrays}, self.key_impl)
 
+    def with_first(self, arrays: Mapping[str, np.ndarray]) -> "Packed":
+        """Return the states of a batch with their first individuals replaced.
+
+        arrays: [B, N, ...], at most as many individuals as the states have.
+        """
+        rest = {name: self.arrays[name][:, array.shape[1] :] for name, array in arrays.items()}
+        return self.with_arrays(
+            {n: np.concatenate([a, rest[n]], axis=1) for n, a in arrays.items()}
+        )
+
     def __getitem__(self, some: int | slice) -> "Packed":
         """Return the state of one run of a batch, or the states of some."""
         return Packed({name: array[some] for name, array in self.arrays.items()}, self.key_impl)

@@ -124,7 +124,7 @@ CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
 PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
 MOTHERS = "mothers"
 """Key in a log line: each individual's own place in the previous generation, or its mother's."""
-ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
+ISLANDS, MIGRATIONS, ANCESTORS = "islands", "migrations.jsonl", "ancestors"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,12 +1,12 @@
-"""The last population of an earlier run as the first of a new one.
+"""The last populations of earlier runs as the first of a new one.
 
-The new run keeps it in its folder, so that it begins again without the earlier run.
+The new run keeps it in its folder, so that it begins again without the earlier runs.
 """
 
 import dataclasses
 import io
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import jax
@@ -17,7 +17,7 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.files import DamagedFile, read_bytes, write_bytes
-from mjxgait.training.checkpoint import first_difference
+from mjxgait.training.checkpoint import Checkpoints, first_difference
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import open_run
@@ -25,7 +25,8 @@ from mjxgait.training.stored import read_stored
 from mjxgait.types import by_name
 
 INITIAL = "initial.npz"
-"""File in a run folder: the arrays [N, ...] of these genomes by dotted name."""
+"""File in a run folder: the arrays [N, ...] of these genomes by dotted name. Those that the earlier
+task did not use are missing and stay as drawn."""
 GENOMES = "genomes."
 MOST = 1_000_000_000
 """Largest size of the file in bytes."""
@@ -35,11 +36,12 @@ Genomes = Mapping[str, np.ndarray]
 
 @dataclasses.dataclass(frozen=True)
 class Initial:
-    """Genomes of a run's last checkpoint, best first, without those that have no fitness.
+    """Genomes of the last checkpoint of a run, or of several, without those that have no fitness.
 
     Attributes:
-      source: folder of that run. controller, reads: its controller and what that observes. joints:
-        names of the body's joints; empty for bodies that grow.
+      source: folder of that run, or of the first. controller, reads: its controller and what that
+        observes. joints: names of the body's joints; empty for bodies that grow.
+      genomes: best first; of several runs first the best of each, then each second best.
     """
 
     source: Path
@@ -61,8 +63,35 @@ def initial_of(source: Path) -> Initial:
     if not alive.any():
         raise UserError(f"{source}: no individual of its last checkpoint has a fitness")
     found = {k.removeprefix(GENOMES): v[alive] for k, v in arrays.items() if k.startswith(GENOMES)}
-    reads = tuple(build_experiment(creature, config).simulator.controller.reads)
+    controller = build_experiment(creature, config).simulator.controller
+    for observation, names in _genes_of(controller).items():
+        if observation not in controller.reads:
+            found = {name: array for name, array in found.items() if name not in names}
+    reads = tuple(controller.reads)
     return Initial(source, config.use.controller, reads, _joints(creature), found)
+
+
+def united(sources: Sequence[Path]) -> Initial:
+    """Return the populations of several runs of one creature; of equal genomes one.
+
+    Raises:
+      UserError: see `initial_of`.
+    """
+    each = [initial_of(source) for source in sources]
+    rows = [_different(one.genomes) for one in each]
+    ranked = sorted((rank, run) for run, own in enumerate(rows) for rank in range(len(own)))
+    genomes = {
+        name: np.stack([each[run].genomes[name][rows[run][rank]] for rank, run in ranked])
+        for name in each[0].genomes
+    }
+    return dataclasses.replace(each[0], genomes=genomes)
+
+
+def _different(genomes: Genomes) -> list[int]:
+    """Return the places of genomes that differ from all before them."""
+    count = len(next(iter(genomes.values())))
+    rows = [b"".join(array[i].tobytes() for array in genomes.values()) for i in range(count)]
+    return [i for i, row in enumerate(rows) if row not in rows[:i]]
 
 
 def check_initial(initial: Initial, experiment: Experiment) -> None:
@@ -85,12 +114,19 @@ def check_initial(initial: Initial, experiment: Experiment) -> None:
             f"new run {', '.join(controller.reads)}"
         )
     wanted, found = _shapes(by_name(experiment.abstract().genomes)), _shapes(initial.genomes)
+    may_lack = {name for names in _genes_of(controller).values() for name in names} - set(found)
+    wanted = {name: shape for name, shape in wanted.items() if name not in may_lack}
     if name := first_difference(found, wanted):
         raise UserError(
             f"{initial.source}: its genomes have {name} of shape {found.get(name, 'none')}, "
             f"the new run's {wanted.get(name, 'none')}; give the new run the same settings of "
             "the controller"
         )
+
+
+def has_begun(folder: Path) -> bool:
+    """Return whether a run has its first individuals."""
+    return (folder / INITIAL).exists() or bool(Checkpoints(folder).generations())
 
 
 def keep_initial(folder: Path, initial: Initial) -> None:
@@ -124,15 +160,22 @@ def planted(state: EvolutionState, genomes: Genomes) -> EvolutionState:
       UserError: the genomes have other shapes.
     """
     own = by_name(state.genomes)
-    if _shapes(own) != _shapes(genomes):
+    if not _shapes(genomes).items() <= _shapes(own).items():
         raise DamagedFile(f"{INITIAL}: its genomes do not fit the settings of this run")
     count = min(len(state.fitness), *(len(array) for array in genomes.values()))
-    leaves = [
-        leaf.at[:count].set(jnp.asarray(genomes[name][:count], leaf.dtype))
-        for name, leaf in own.items()
-    ]
-    made = jax.tree.unflatten(jax.tree.structure(state.genomes), leaves)
+    for name, array in genomes.items():
+        own[name] = own[name].at[:count].set(jnp.asarray(array[:count], own[name].dtype))
+    made = jax.tree.unflatten(jax.tree.structure(state.genomes), own.values())
     return dataclasses.replace(state, genomes=made)
+
+
+def _genes_of(controller: object) -> Mapping[str, Sequence[str]]:
+    """Return the arrays of a genome that do nothing without an observation.
+
+    Only bodies that grow have some: their tasks differ in what a brain observes.
+    """
+    found: Mapping[str, Sequence[str]] = getattr(controller, "genes_of", {})
+    return found
 
 
 def _joints(creature: Creature) -> tuple[str, ...]:

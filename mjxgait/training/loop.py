@@ -32,6 +32,7 @@ from mjxgait.training.folder import (
     METRICS,
     STRESS,
     append_lines,
+    command,
     kept_champion,
     read_metrics,
     truncate_metrics,
@@ -41,6 +42,7 @@ from mjxgait.training.initial import (
     Genomes,
     Initial,
     check_initial,
+    has_begun,
     keep_initial,
     planted,
     read_initial,
@@ -61,6 +63,7 @@ def train(
     evaluator: Evaluator | None = None,
     begin: Callable[[], object] = lambda: None,
     initial: Initial | None = None,
+    ancestors: Callable[[], Initial | None] | None = None,
 ) -> bool:
     """Run or resume the evolution in a run folder; return whether it came to its end.
 
@@ -69,6 +72,7 @@ def train(
       evaluator: evaluates the individuals instead of this machine.
       begin: creates the folder of a new run; called after the last check.
       initial: first individuals of a new run.
+      ancestors: evolves the first individuals of a run that has none yet; None: interrupted.
 
     Raises:
       UserError: the physics does not support the creature's model, the first individuals do not
@@ -78,6 +82,13 @@ def train(
     if initial:
         check_initial(initial, experiment)
     with locked_run(folder, resume, begin):
+        if ancestors and not initial and not has_begun(folder):
+            initial = ancestors()
+            if initial is None:
+                again = command("train", "--resume", folder, run=folder)
+                screen.say(f"interrupted; go on with: {again}")
+                return False
+            check_initial(initial, experiment)
         if initial:
             keep_initial(folder, initial)
         return _train(folder, experiment, screen, resume, generation, evaluator)

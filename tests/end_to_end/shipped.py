@@ -43,6 +43,7 @@ FEW_STARTS = ("--rollout.variety", "2")
 FEW_BLOCKS = (
     *("--controller.nodes", "3", "--controller.parts", "3", "--controller.links", "4"),
     *("--fitness.settle", "0.1"),
+    *("--evolution.ancestors.population", "4", "--evolution.ancestors.generations", "1"),
 )
 """The same for modular bodies: compile time grows with the padded size, and an episode must be
 longer than settling.

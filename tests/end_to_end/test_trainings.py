@@ -43,6 +43,7 @@ from mjxgait.training.folder import (
     open_champion,
     open_run,
 )
+from mjxgait.training.initial import read_initial
 
 WAYS = list(trainings())
 TRAINED = {
@@ -197,8 +198,11 @@ def test_a_changed_body_or_simulator_ends_with_a_certificate(name: str, tmp_path
 
 @pytest.mark.slow
 def test_a_body_that_the_light_steers_ends_with_a_certificate(tmp_path: Path, capsys):
-    """Its genomes hold weights that those of other runs lack."""
+    """Its genomes hold weights of the light, which its ancestors do not use."""
     follow = Way("blocks", task="follow")
     steered = ("--controller.steer", "--controller.evolves", "steering")
     train(capsys, tmp_path / "run", *follow.arguments, *steered)
     assert "nerves.steer" in open_champion(tmp_path / "run")[1].genome
+    ancestors = read_initial(tmp_path / "run") or {}
+    assert "nerves.kind" in ancestors
+    assert "nerves.steer" not in ancestors

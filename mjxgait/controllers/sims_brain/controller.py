@@ -37,6 +37,8 @@ class Brains:
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
+    genes_of: ClassVar[Mapping[str, Sequence[str]]] = {LIGHT: ("nerves.steer",)}
+    """Arrays of a genome, by dotted name, that do nothing without an observation."""
 
     @classmethod
     def with_settings(

@@ -142,6 +142,9 @@ def random_graph(key: jax.Array, capacity: Capacity, ranges: Ranges) -> Graph:
 
 STEER = (-1.0, 1.0)
 """Range of `Nerves.steer`. A hinge's drive is limited to this range."""
+STEER_SCALE, STEERED = (0.05, 0.7), 0.5
+"""Range of the standard deviation of a random genome's `Nerves.steer`, log-uniform, and the share
+of hinges that have any. Weights uniform in `STEER` drown the motion of nearly all creatures."""
 CONSTANT, WAVE = 0.3, 0.3
 """Shares of inputs drawn as constants, and of neurons drawn as waves. With uniform draws a wave of
 constant frequency drives only one effector in 400."""
@@ -194,15 +197,23 @@ class Centre:
 def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
     """Draw random neurons: any function, any source; weights are normal."""
     effects = {"effect_source": (nodes, 3), "effect_weight": (nodes, 3)}
-    steer = {"steer": (nodes, 3, 2, 3)} if room.steer else {}
+    steer = {"scale": (), "steered": (nodes, 3), "steer": (nodes, 3, 2, 3)} if room.steer else {}
     drawn = uniforms(key, _shapes((nodes, room.local)) | effects | steer)
     source = numbered(drawn["effect_source"], room.codes)
     return Nerves(
         **_neurons(drawn, room),
         effect_source=source,
         effect_weight=normal(drawn["effect_weight"]),
-        steer=between(drawn["steer"], STEER) if room.steer else None,
+        steer=_steering(drawn) if room.steer else None,
     )
+
+
+def _steering(drawn: Mapping[str, jax.Array]) -> jax.Array:
+    """Draw `Nerves.steer`: normal for some hinges, 0 for the others."""
+    least, most = STEER_SCALE
+    scale = least * (most / least) ** drawn["scale"]
+    weights = jnp.clip(scale * normal(drawn["steer"]), *STEER)
+    return jnp.where((drawn["steered"] < STEERED)[..., None, None], weights, 0.0)
 
 
 def random_centre(key: jax.Array, room: NerveRoom) -> Centre:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 
+from mjxgait.config.evolution import AncestorsConfig
 from mjxgait.config.layers import data_folder
 from mjxgait.config.schema import Config, GroundText, Physics
 from mjxgait.config.tables import (
@@ -229,7 +230,7 @@ def _told_of(where: str) -> Iterator[None]:
 
 
 def _settled(config: Config, generations: int) -> Config:
-    """Return the config without early stopping.
+    """Return the config without early stopping and without ancestors.
 
     A run that stopped early would be compared with runs of more generations.
     """
@@ -238,6 +239,7 @@ def _settled(config: Config, generations: int) -> Config:
         target=None,
         generations=generations,
         forced=dataclasses.replace(config.evolution.forced, patience=0),
+        ancestors=AncestorsConfig(),
     )
     return dataclasses.replace(config, evolution=evolution)
 
@@ -246,6 +248,10 @@ def _lay(config: Config, table: Table, where: str) -> Config:
     if "seed" in table or "generations" in table.get("evolution", {}):
         raise UserError(
             f"{where}: seeds and generations are the study's own keys, not settings of a variant"
+        )
+    if "ancestors" in table.get("evolution", {}):
+        raise UserError(
+            f"{where}: runs of a study begin with drawn individuals, not with ancestors"
         )
     laid = build(type(config), merge(dataclasses.asdict(config), table), where)
     if laid.evolution.islands.count > 1:

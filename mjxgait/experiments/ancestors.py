@@ -1,0 +1,123 @@
+"""Runs of an easier task that come before a run: the best of each begin it (two-step evolution)."""
+
+import dataclasses
+import shutil
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from mjxgait.config.evolution import AncestorsConfig
+from mjxgait.config.schema import Config
+from mjxgait.config.traced import shape_settings
+from mjxgait.creature import Creature
+from mjxgait.distributed.evolve import scheduler_at
+from mjxgait.distributed.jobs import Advanced
+from mjxgait.distributed.rows import Rows
+from mjxgait.experiments.multi_seed import create_zoo, folders_of, is_zoo
+from mjxgait.tasks.walk.targets import WalkTargets, configured
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.experiment import build_experiment
+from mjxgait.training.folder import ANCESTORS, open_run
+from mjxgait.training.initial import (
+    GENOMES,
+    Initial,
+    check_initial,
+    has_begun,
+    keep_initial,
+    read_initial,
+    united,
+)
+from mjxgait.training.loop import interruptible
+
+Say = Callable[[str], object]
+
+
+def evolve_ancestors(folder: Path, creature: Creature, config: Config, say: Say) -> Initial | None:
+    """Evolve the ancestors of a run in its folder, or go on with them; None if interrupted.
+
+    Raises:
+      UserError: the folder cannot be written, or a stored run of it is damaged.
+    """
+    ancestors, place = config.evolution.ancestors, folder / ANCESTORS
+    if not is_zoo(place):
+        with disk_errors(place):
+            shutil.rmtree(place, ignore_errors=True)  # of a run killed while it made this folder
+        create_zoo(place, creature, _settings(creature, config), ancestors.runs)
+    say(
+        f"First {ancestors.runs} runs of the task {ancestors.task}, of "
+        f"{ancestors.generations} generations: their best begin this run."
+    )
+    runs = folders_of(place)
+    rows = Rows(creature, runs, partial(_tell, say))
+    with interruptible() as interrupted, scheduler_at(None) as scheduler:
+        if rows.to_the_end(scheduler, interrupted.is_set) is None:
+            return None
+    return united(runs)
+
+
+def first_genomes(
+    folders: Sequence[Path], creature: Creature, say: Say
+) -> dict[str, np.ndarray] | None:
+    """Return what the rows of several runs begin with, [B, N, ...] by name in a state.
+
+    Empty if they have no ancestors, None if interrupted. The ancestors of one run after another
+    evolve where that is still to be done.
+    """
+    kept = []
+    for folder in folders:
+        config = open_run(folder)[1]
+        if not config.evolution.ancestors.runs:
+            return {}
+        if not has_begun(folder):
+            initial = evolve_ancestors(folder, creature, config, say)
+            if initial is None:
+                return None
+            check_initial(initial, build_experiment(creature, config))
+            keep_initial(folder, initial)
+        kept.append(read_initial(folder) or {})
+    size = config.evolution.population
+    count = min(size, *(len(array) for genomes in kept for array in genomes.values()))
+    return {
+        f"{GENOMES}{name}": np.stack([genomes[name][:count] for genomes in kept])
+        for name in kept[0]
+    }
+
+
+def _settings(creature: Creature, config: Config) -> Config:
+    """Return the settings of the ancestors with the first seed.
+
+    They are the creature's for that task, with genomes and physics of the run.
+    """
+    ancestors, use = config.evolution.ancestors, config.use
+    chosen = {"controller": use.controller, "task": ancestors.task}
+    own = configured(creature, None, chosen, WalkTargets())
+    names = shape_settings(type(config.controller))
+    shape = {name: getattr(config.controller, name) for name in names}
+    evolution = dataclasses.replace(
+        own.evolution,
+        population=ancestors.population,
+        generations=ancestors.generations,
+        body=config.evolution.body,
+        ancestors=AncestorsConfig(),
+    )
+    rollout = dataclasses.replace(
+        own.rollout, physics=config.rollout.physics, step=config.rollout.step
+    )
+    return dataclasses.replace(
+        own,
+        seed=config.seed * ancestors.runs,
+        controller=dataclasses.replace(own.controller, **shape),
+        evolution=evolution,
+        rollout=rollout,
+        checkpoint_every=config.checkpoint_every,
+    )
+
+
+def _tell(say: Say, generation: int, last: int, done: Advanced | None) -> None:
+    if done is None or not done.lines:
+        return
+    bests: Sequence[float | None] = [line["best"] for line in done.lines[-1]]
+    shown = " ".join("-" if best is None else f"{best:.3g}" for best in bests)
+    say(f"  generation {generation} of {last}, best fitness of each: {shown}")
