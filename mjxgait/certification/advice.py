@@ -8,6 +8,7 @@ from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.certification.feasibility import feasibility
 from mjxgait.certification.remedies import TABLE, USUAL, Entry
 from mjxgait.creature import Creature
+from mjxgait.kinds import known_task
 
 ADVICE = "advice"
 """Key of a report: these sentences; absent if all criteria passed."""
@@ -48,7 +49,8 @@ def advised(
     """Return a report's entry with the advice; empty if all criteria passed."""
     if all(criterion.passed for criterion in criteria):
         return {}
-    limits = [] if creature.settings.creature.grows else feasibility(creature).limits
+    kind = known_task(task)
+    limits = [] if kind and kind.modular else feasibility(creature).limits
     return {ADVICE: advice(criteria, task, report, limits)}
 
 

@@ -232,7 +232,8 @@ GAIT = (
         "A joint vibrates, with {v:.0%} of the joints' speed; {t:.0%} is allowed.",
         by_task=_walk(
             "Raise --fitness.weights.energy, or soften the joints: --drive.stiffness 0.7."
-        ),
+        )
+        | dict.fromkeys(("roam", "follow-on-land"), _raise("vibration")),
     ),
     Entry("left and right *", "It limps: its {name} are {v:.0%} apart; {t:.0%} is allowed."),
 )

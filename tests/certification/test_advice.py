@@ -163,6 +163,15 @@ def test_a_limit_of_the_body_takes_the_place_of_the_remedy():
     assert advice([criterion], "walk", {}, [weak])[1:] == [*weak]
 
 
+def test_a_body_that_grew_has_no_standing_pose_to_blame(stool: Creature):
+    criterion, _ = made_up("speed (body lengths/s)")
+    strained = dataclasses.replace(
+        stool, gains=dataclasses.replace(stool.gains, torque_limit=stool.gains.torque_limit / 99)
+    )
+    assert "too weak" in " ".join(advised([criterion], "walk", {}, strained)[ADVICE])
+    assert "too weak" not in " ".join(advised([criterion], "roam", {}, strained)[ADVICE])
+
+
 def test_a_measure_of_the_user_is_named_with_its_numbers(stool: Creature):
     criterion, _ = made_up("height of the ball")
     said = advice([criterion], "mine.py:Juggle", {})

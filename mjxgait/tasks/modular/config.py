@@ -1,8 +1,9 @@
 """Settings of the tasks for modular bodies."""
 
 import dataclasses
+from typing import Annotated
 
-from mjxgait.config.tables import STRICT, NonNegative, Positive
+from mjxgait.config.tables import ADDED, STRICT, NonNegative, Positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,18 +56,20 @@ class SwimConfig(BlocksConfig):
 
 @dataclasses.dataclass(frozen=True)
 class RoamWeights:
-    """Weight of each term; `overlap` and `balance` are penalties.
+    """Weight of each term; all but `speed` are penalties.
 
     Attributes:
       speed: m/s over ground, in a straight line.
       overlap: part of the speed lost by blocks in each other or in the ground.
       balance: part of the rest lost by tipping over.
+      vibration: part of the rest lost by joints that vibrate.
     """
 
     __pydantic_config__ = STRICT
     speed: NonNegative = 1.0
     overlap: NonNegative = 1.0
     balance: NonNegative = 1.0
+    vibration: Annotated[NonNegative, ADDED] = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,12 +79,16 @@ class RoamConfig(BlocksConfig):
     Attributes:
       tilt: deg, largest tilt of the root from its settled attitude, at which half of the speed
         counts.
+      vibration: change of the joints' speeds from step to step, over these speeds (root mean
+        squares), at which half of the speed counts. A joint that swings f times a second has
+        2 sin(pi f step).
       weights: weight of each term.
     """
 
     __pydantic_config__ = STRICT
     apart: NonNegative = 10.0
     tilt: Positive = 45.0
+    vibration: Annotated[Positive, ADDED] = 0.8
     weights: RoamWeights = dataclasses.field(default_factory=RoamWeights)
 
 

@@ -166,7 +166,13 @@ def lost(much: jax.Array) -> jax.Array:
 
 
 LITTLE = 1e-6
-"""Lower bound of the momentum exchanged with the water, in kg·m/s."""
+"""Least divisor: momentum exchanged with the water in kg·m/s, squared joint speeds in (rad/s)²."""
+SHARPNESS = 3
+"""Exponent of the cost of vibration and of a jumper's depth: little costs less, much costs more.
+
+A fall presses the body into the ground for a moment, to a depth that grows as the square root of
+its height. At the cost of walking no jump above a tenth of a metre would be worth more.
+"""
 
 
 @pytree
@@ -235,10 +241,15 @@ class RoamStats(GoingStats):
 
     upwards: [3] direction in the root's axes that was up when counting began.
     upright: [] least cosine of its angle with the world's up axis since then.
+    joint_vel: [J] rad/s, at the last step. moved: [] sum of its squares over joints and steps since
+    then. jerked: [] the same of its changes from step to step.
     """
 
     upwards: jax.Array
     upright: jax.Array
+    joint_vel: jax.Array
+    moved: jax.Array
+    jerked: jax.Array
 
 
 class Roam(GoingTask):
@@ -250,7 +261,15 @@ class Roam(GoingTask):
 
     @override
     def init(self) -> RoamStats:
-        return RoamStats(**self.begun(), upwards=jnp.zeros(3), upright=jnp.ones(()))
+        joints, none = jnp.zeros(len(self.creature.joints.names)), jnp.zeros(())
+        return RoamStats(
+            **self.begun(),
+            upwards=jnp.zeros(3),
+            upright=jnp.ones(()),
+            joint_vel=joints,
+            moved=none,
+            jerked=none,
+        )
 
     @override
     def update(
@@ -259,15 +278,19 @@ class Roam(GoingTask):
         begins = stats.steps <= params
         upwards = jnp.where(begins, sensed.trunk_rot[2], stats.upwards)
         upright = jnp.sum(sensed.trunk_rot[2] * upwards)
+        changes = sensed.joint_vel - stats.joint_vel
         return dataclasses.replace(
             super().update(stats, sensed, torque, params, goal),
             overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, own(sensed).depth)),
             upwards=upwards,
             upright=jnp.where(begins, 1.0, jnp.minimum(stats.upright, upright)),
+            joint_vel=sensed.joint_vel,
+            moved=jnp.where(begins, 0.0, stats.moved + jnp.sum(sensed.joint_vel**2)),
+            jerked=jnp.where(begins, 0.0, stats.jerked + jnp.sum(changes**2)),
         )
 
     def evaluate(self, stats: RoamStats, settings: RoamConfig) -> Mapping[str, jax.Array]:
-        """The speed; its loss by overlap; the loss of the rest by tipping over.
+        """The speed; its loss by overlap; of the rest by tipping over, of that rest by vibration.
 
         Blocks overlap each other or the ground.
         """
@@ -276,15 +299,14 @@ class Roam(GoingTask):
         inside = lost(stats.overlap / settings.overlap)
         tilt = jnp.degrees(jnp.arccos(jnp.clip(stats.upright, -1.0, 1.0)))
         tipped = (1 - inside) * lost(tilt / settings.tilt)
-        return {"speed": speed, "overlap": earned * inside, "balance": earned * tipped}
-
-
-SHARPNESS = 3
-"""Exponent of the cost of depth: small depths cost less than in walking, large ones more.
-
-A fall presses the body into the ground for a moment, to a depth that grows as the square root of
-its height. At the cost of walking no jump above a tenth of a metre would be worth more.
-"""
+        shaken = jnp.sqrt(stats.jerked / jnp.maximum(stats.moved, LITTLE))
+        vibrates = (1 - inside - tipped) * lost((shaken / settings.vibration) ** SHARPNESS)
+        return {
+            "speed": speed,
+            "overlap": earned * inside,
+            "balance": earned * tipped,
+            "vibration": earned * vibrates,
+        }
 
 
 SPANS = 2

@@ -2,6 +2,7 @@
 
 import dataclasses
 import types
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -157,9 +158,16 @@ def test_heights_and_positions_are_kept_for_every_frame(experiment: Experiment, 
 
 
 def evaluation(
-    task: Roam, tilt: float = 0.0, sunk: float = 0.0, before: float = 0.0
+    task: Roam,
+    tilt: float = 0.0,
+    sunk: float = 0.0,
+    before: float = 0.0,
+    hertz: Callable[[float], float] = lambda time: 0.0,
 ) -> dict[str, float]:
-    """Terms at 1 m/s. tilt, sunk: at one moment; before: both, before settling. Angles in deg."""
+    """Terms at 1 m/s. tilt, sunk: at one moment; before: both, before settling. Angles in deg.
+
+    hertz: swings of one of the joints per second, at each moment.
+    """
     settings = RoamConfig(settle=0.5)
     stats, params = task.init(), task.params(settings)
     for k in range(task.horizon):
@@ -171,7 +179,9 @@ def evaluation(
             "com": jnp.array([0.0, task.step * k, 0.1 * k]),
             "depth": jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
         }
-        sensed = moment(own, trunk_rot=turned)
+        time = task.step * k
+        swings = jnp.zeros_like(CALM.joint_vel).at[0].set(np.sin(2 * np.pi * hertz(time) * time))
+        sensed = moment(own, trunk_rot=turned, joint_vel=swings)
         stats = task.update(stats, sensed, jnp.zeros(3), params, ())
     return {name: float(value) for name, value in task.evaluate(stats, settings).items()}
 
@@ -195,6 +205,19 @@ def test_tipping_over_costs_speed(task: Roam):
     assert leaning["balance"] == pytest.approx(leaning["speed"] / 2, rel=1e-3)
     assert over["balance"] > 0.9 * over["speed"]
     assert leaning["overlap"] == 0
+
+
+def test_joints_that_vibrate_cost_speed(task: Roam):
+    half = np.arcsin(RoamConfig().vibration / 2) / (np.pi * task.step)
+    swings = evaluation(task, hertz=lambda time: half)
+    assert swings["vibration"] == pytest.approx(swings["speed"] / 2, rel=0.05)
+    calm, buzzing = (evaluation(task, hertz=lambda time, n=n: n * half) for n in (0.3, 2.0))
+    assert calm["vibration"] < 0.01 * calm["speed"]
+    assert buzzing["vibration"] > 0.8 * buzzing["speed"]
+    early = evaluation(task, hertz=lambda time: 2 * half if time < 0.45 else 0.1 * half)
+    assert early["vibration"] < 0.01 * early["speed"]
+    tipped = evaluation(task, tilt=180.0, hertz=lambda time: 2 * half)
+    assert tipped["balance"] + tipped["vibration"] < tipped["speed"]
 
 
 def test_jump_height_is_of_the_lowest_part_after_settling(task: Roam):
