@@ -8,7 +8,7 @@ _kind = partial(TaskKind, home=__name__, modular=True)
 KINDS = (
     _kind(
         "swim",
-        task="task:Swim",
+        task="swim:Swim",
         criteria="criteria:SwimCriteria",
         water=True,
         tables=("swim",),
@@ -16,7 +16,7 @@ KINDS = (
     ),
     _kind(
         "roam",
-        task="task:Roam",
+        task="roam:Roam",
         criteria="criteria:RoamCriteria",
         called="walk",
         tables=("roam",),
@@ -24,7 +24,7 @@ KINDS = (
     ),
     _kind(
         "jump",
-        task="task:Jump",
+        task="jump:Jump",
         criteria="criteria:JumpCriteria",
         tables=("jump",),
         what="jump high; for bodies that grow",

@@ -7,7 +7,7 @@ from mjxgait.config.tables import ADDED, STRICT, NonNegative, Positive
 
 
 @dataclasses.dataclass(frozen=True)
-class BlocksConfig:
+class ModularConfig:
     """Parameters common to these tasks.
 
     Attributes:
@@ -40,7 +40,7 @@ class SwimWeights:
 
 
 @dataclasses.dataclass(frozen=True)
-class SwimConfig(BlocksConfig):
+class SwimConfig(ModularConfig):
     """Parameters of the swim fitness.
 
     Attributes:
@@ -73,7 +73,7 @@ class RoamWeights:
 
 
 @dataclasses.dataclass(frozen=True)
-class RoamConfig(BlocksConfig):
+class RoamConfig(ModularConfig):
     """Parameters of the roam fitness.
 
     Attributes:
@@ -110,7 +110,7 @@ class JumpWeights:
 
 
 @dataclasses.dataclass(frozen=True)
-class JumpConfig(BlocksConfig):
+class JumpConfig(ModularConfig):
     """Parameters of the jump fitness.
 
     Attributes:

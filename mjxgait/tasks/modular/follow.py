@@ -16,19 +16,21 @@ from typing_extensions import override
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.controllers.sims_brain.reference_body import LIGHT
 from mjxgait.creature import Creature
-from mjxgait.tasks.modular.task import GoingTask, Roam, Swim, length, own
+from mjxgait.tasks.modular.base import LocomotionTask, length, own
+from mjxgait.tasks.modular.roam import Roam
+from mjxgait.tasks.modular.swim import Swim
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed
 
 
-class Following(GoingTask):
+class Following(LocomotionTask):
     """Implementation of `Task`: base class for following in water and on land.
 
     The way is the decrease of the distance to the light.
     """
 
     adds: ClassVar[tuple[str, ...]] = ("light",)
-    outcomes = (*GoingTask.outcomes, "since")
+    outcomes = (*LocomotionTask.outcomes, "since")
     dark = np.zeros(3, np.float32)
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:

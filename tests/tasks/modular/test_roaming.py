@@ -28,7 +28,8 @@ from mjxgait.reference.starts import nominal_starts
 from mjxgait.reference.stepping import Stepping
 from mjxgait.tasks.modular.config import JumpConfig, RoamConfig
 from mjxgait.tasks.modular.follow import Following, FollowInWater, FollowOnLand
-from mjxgait.tasks.modular.task import SPANS, Jump, Roam
+from mjxgait.tasks.modular.jump import SPANS, Jump
+from mjxgait.tasks.modular.roam import Roam
 from mjxgait.training.experiment import Experiment, build_experiment
 
 TABLE = {

@@ -22,8 +22,9 @@ from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.curves import figure
 from mjxgait.rendering.genomes import bodies_of, draw_bodies, draw_graph
 from mjxgait.rendering.walk import record_walk
+from mjxgait.tasks.modular.base import FASTEST_HINGE, FURTHEST
 from mjxgait.tasks.modular.config import SwimConfig
-from mjxgait.tasks.modular.task import FASTEST_HINGE, FURTHEST, Swim
+from mjxgait.tasks.modular.swim import Swim
 from mjxgait.training.advance import metrics_line
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.experiment import Experiment, Step, build_experiment
