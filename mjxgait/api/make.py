@@ -268,12 +268,13 @@ def evolve(
 
     For the arguments and errors see `training.loop.train` and `distributed.evolve.evolve`.
     """
-    from mjxgait.experiments.ancestors import evolve_ancestors
+    from mjxgait.experiments.ancestors import evolve_ancestors, settings_of_ancestors
     from mjxgait.experiments.multi_seed import folders_of, is_zoo
     from mjxgait.training.initial import united
 
     ancestors = None
     if config.evolution.ancestors.runs:
+        settings_of_ancestors(creature, config)  # refuses before the folder is made
         ancestors = partial(evolve_ancestors, folder, creature, config, screen.say)
     elsewhere = cluster or config.evolution.islands.count > 1
     if source and elsewhere:

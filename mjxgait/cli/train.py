@@ -145,6 +145,10 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
         # On a cluster each run is a job of its own, so that every machine gets work.
         together = 1 if options.cluster else 0
         zoo = check_zoo(options.out, creature, config, options.runs)
+        if config.evolution.ancestors.runs:
+            from mjxgait.experiments.ancestors import settings_of_ancestors  # leads to JAX
+
+            settings_of_ancestors(creature, config)
         begin = partial(create_zoo, zoo, creature, config, options.runs, together)
         ended = evolve_zoo(zoo, output, options.cluster, begin)
         return 0 if ended else INTERRUPTED

@@ -19,7 +19,7 @@ from mjxgait.experiments.multi_seed import create_zoo, folders_of, is_zoo
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import build_experiment
-from mjxgait.training.folder import ANCESTORS, open_run
+from mjxgait.training.folder import ANCESTORS, check_parts, open_run
 from mjxgait.training.initial import (
     GENOMES,
     Initial,
@@ -44,7 +44,7 @@ def evolve_ancestors(folder: Path, creature: Creature, config: Config, say: Say)
     if not is_zoo(place):
         with disk_errors(place):
             shutil.rmtree(place, ignore_errors=True)  # of a run killed while it made this folder
-        create_zoo(place, creature, _settings(creature, config), ancestors.runs)
+        create_zoo(place, creature, settings_of_ancestors(creature, config), ancestors.runs)
     say(
         f"First {ancestors.runs} runs of the task {ancestors.task}, of "
         f"{ancestors.generations} generations: their best begin this run."
@@ -85,14 +85,18 @@ def first_genomes(
     }
 
 
-def _settings(creature: Creature, config: Config) -> Config:
-    """Return the settings of the ancestors with the first seed.
+def settings_of_ancestors(creature: Creature, config: Config) -> Config:
+    """Return the settings of a run's ancestors with the first seed.
 
     They are the creature's for that task, with genomes and physics of the run.
+
+    Raises:
+      UserError: the task is unknown, or does not fit.
     """
     ancestors, use = config.evolution.ancestors, config.use
     chosen = {"controller": use.controller, "task": ancestors.task}
     own = configured(creature, None, chosen, WalkTargets())
+    check_parts(creature, own)
     names = shape_settings(type(config.controller))
     shape = {name: getattr(config.controller, name) for name in names}
     evolution = dataclasses.replace(

@@ -18,8 +18,7 @@ from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.creature import Creature
 from mjxgait.distributed.rows import Rows
 from mjxgait.errors import UserError
-from mjxgait.experiments import ancestors
-from mjxgait.experiments.ancestors import first_genomes
+from mjxgait.experiments.ancestors import first_genomes, settings_of_ancestors
 from mjxgait.experiments.multi_seed import create_zoo, folders_of
 from mjxgait.plugins import resolve_config
 from mjxgait.training import stages
@@ -196,7 +195,7 @@ def test_followers_come_from_runs_without_a_light():
         settings = resolve_config(blocks.settings.train, "blocks", use={"task": task})
         chosen = settings.evolution.ancestors
         assert (chosen.task, chosen.runs, settings.controller.steer) == (before, 6, True)
-        own = ancestors._settings(blocks, settings)
+        own = settings_of_ancestors(blocks, settings)
         assert (own.use.task, own.controller.steer) == (mode, True)
         assert own.controller.strength == (1.0, 1.0), "of the easier task"
 
@@ -213,6 +212,14 @@ def test_islands_and_studies_begin_as_drawn(capsys, tmp_path: Path):
     )
     said = said_by(capsys, "ablate", study, "--out", tmp_path / "study", code=2)
     assert "begin with drawn individuals, not with ancestors" in said
+
+
+@pytest.mark.parametrize("runs", [(), ("--runs", 2)])
+def test_an_unknown_task_is_refused_before_a_folder_is_made(runs, capsys, tmp_path: Path):
+    follow = ("train", "--env", "blocks", "--task", "follow", "--out", tmp_path / "run", *runs)
+    said = said_by(capsys, *follow, "--evolution.ancestors.task", "fly", code=2)
+    assert "fly" in said
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_single_ancestor_is_refused():
