@@ -1,10 +1,8 @@
 """Base classes of the tasks for modular bodies: start at rest; any plausible motion counts.
 
-Physically implausible motion ends the episode. Nothing counts until the body has settled. A way is
-that of the centre of mass: bending moves the root, but not the whole body.
-
-Falling over also covers distance, once. So distance counts only after settling, and tipping over
-from there costs.
+Physically implausible motion ends the episode. Distances are those of the centre of mass, because
+bending moves the root but not the whole body. They count once the body has settled: a fall covers
+some distance, too.
 """
 
 import dataclasses
@@ -30,7 +28,7 @@ from mjxgait.tasks.terms import ramp
 from mjxgait.types import Sensed, pytree
 
 WILD = 1
-"""Reason for an early end: faster than anything alive, or bent past the range of a joint."""
+"""Reason for an early end: implausibly fast, or a hinge past its range."""
 FASTEST_HINGE, FASTEST, FURTHEST = 20.0, 5.0, 0.08
 """rad/s, m/s, rad past a hinge's range."""
 LITTLE = 1e-6
