@@ -19,9 +19,7 @@ from mjxgait.creature import Creature
 from mjxgait.physics.batched_trees.tree import ModularSensed
 from mjxgait.tasks.base import EpisodeStats
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.modular.config import (
-    ModularConfig,
-)
+from mjxgait.tasks.modular.config import ModularConfig
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.starts import NEVER, Starts, half_widths
 from mjxgait.tasks.terms import ramp
