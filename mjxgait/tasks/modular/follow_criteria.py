@@ -23,6 +23,8 @@ class FollowCriteria(ModularCriteria):
     verdict = "it follows a light"
     verb = "follows"
     promised = "speed"
+    worth = 0.75
+    """As many of the lights as criterion 4 requires: with all four, runs waited for a lucky round."""
 
     def __init__(self, drag: float) -> None:
         self.drag = drag

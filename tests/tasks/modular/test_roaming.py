@@ -316,11 +316,12 @@ def test_lights_in_water_form_tetrahedra_and_crosses(task: Roam):
     assert min(solids, crosses) > 30
 
 
-def test_validation_requires_approaching_every_light():
+def test_validation_requires_approaching_as_many_lights_as_the_certificate():
     acceptance, creature = acceptance_of("follow-on-land"), load_creature("blocks")
-    outcome = {"way": np.array([2.0, 2.0]), "seconds": np.array([10.0, 10.0])}
+    assert acceptance.worth == CertificateConfig().follow.arrive
+    outcome = {"way": np.array([2.0, 2.0, 0.9, 2.0]), "seconds": np.full(4, 10.0)}
     assert promising(acceptance, outcome, 10.0, creature)
-    slow = {**outcome, "way": np.array([2.0, 0.9])}
+    slow = {**outcome, "way": np.array([2.0, 0.9, 0.9, 2.0])}
     assert not promising(acceptance, slow, 10.0, creature)
 
 
