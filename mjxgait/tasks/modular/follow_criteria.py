@@ -24,7 +24,7 @@ class FollowCriteria(ModularCriteria):
     verb = "follows"
     promised = "speed"
     worth = 0.75
-    """As many of the lights as criterion 4 requires: with all four, runs waited for a lucky round."""
+    """As many of the lights as criterion 4 requires."""
 
     def __init__(self, drag: float) -> None:
         self.drag = drag
