@@ -1,16 +1,16 @@
 """Several runs of one creature side by side, from their folder to their picture."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mjxgait.api.progress import Progress, pace
-from mjxgait.experiments.multi_seed import draw_zoo, found_in, read_seeds, size, table
+from mjxgait.experiments.multi_seed import bests, draw_zoo, found_in, read_seeds, size, table
 from mjxgait.files import replaced
 from mjxgait.output import Output
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import Line, command, open_run
+from mjxgait.training.folder import command, open_run
 from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
@@ -93,12 +93,8 @@ class _Screen(Progress):
         if done is None:
             self.output.say("compiling")
             return
-        best = " ".join("-" if b is None else f"{b:.3g}" for b in _best(done.lines))
+        best = bests(done.lines[-1]) if done.lines else ""
         self.output.say(
             f"generation {generation} of {last}, best fitness of each: {best}; "
             f"{pace(done, last - generation)}"
         )
-
-
-def _best(lines: Sequence[Sequence[Line]]) -> list[float | None]:
-    return [line["best"] for line in lines[-1]] if lines else []

@@ -15,7 +15,7 @@ from mjxgait.creature import Creature
 from mjxgait.distributed.evolve import scheduler_at
 from mjxgait.distributed.jobs import Advanced
 from mjxgait.distributed.rows import Rows
-from mjxgait.experiments.multi_seed import create_zoo, folders_of, is_zoo
+from mjxgait.experiments.multi_seed import bests, create_zoo, folders_of, is_zoo
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import build_experiment
@@ -42,8 +42,9 @@ def evolve_ancestors(folder: Path, creature: Creature, config: Config, say: Say)
     """
     ancestors, place = config.evolution.ancestors, folder / ANCESTORS
     if not is_zoo(place):
-        with disk_errors(place):
-            shutil.rmtree(place, ignore_errors=True)  # of a run killed while it made this folder
+        if place.exists():  # of a run killed while it made this folder
+            with disk_errors(place):
+                shutil.rmtree(place)
         create_zoo(place, creature, settings_of_ancestors(creature, config), ancestors.runs)
     say(
         f"First {ancestors.runs} runs of the task {ancestors.task}, of "
@@ -122,6 +123,4 @@ def settings_of_ancestors(creature: Creature, config: Config) -> Config:
 def _tell(say: Say, generation: int, last: int, done: Advanced | None) -> None:
     if done is None or not done.lines:
         return
-    bests: Sequence[float | None] = [line["best"] for line in done.lines[-1]]
-    shown = " ".join("-" if best is None else f"{best:.3g}" for best in bests)
-    say(f"  generation {generation} of {last}, best fitness of each: {shown}")
+    say(f"  generation {generation} of {last}, best fitness of each: {bests(done.lines[-1])}")

@@ -20,6 +20,7 @@ from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
+    Line,
     check_free,
     check_parts,
     create_run,
@@ -115,6 +116,11 @@ def to_the_last(config: Config) -> Config:
     examination = dataclasses.replace(config.examination, every=0)
     evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
     return dataclasses.replace(config, evolution=evolution, examination=examination)
+
+
+def bests(lines: Sequence[Line]) -> str:
+    """Return the best fitness of each run as text, from their log lines of one generation."""
+    return " ".join("-" if line["best"] is None else f"{line['best']:.3g}" for line in lines)
 
 
 COLUMNS = 4

@@ -6,7 +6,7 @@ The new run keeps it in its folder, so that it begins again without the earlier 
 import dataclasses
 import io
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 
 import jax
@@ -32,6 +32,8 @@ MOST = 1_000_000_000
 """Largest size of the file in bytes."""
 
 Genomes = Mapping[str, np.ndarray]
+Shapes = dict[str, tuple[int, ...]]
+"""Shape of each array of a genome by dotted name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,8 +116,7 @@ def check_initial(initial: Initial, experiment: Experiment) -> None:
             f"new run {', '.join(controller.reads)}"
         )
     wanted, found = _shapes(by_name(experiment.abstract().genomes)), _shapes(initial.genomes)
-    may_lack = {name for names in _genes_of(controller).values() for name in names} - set(found)
-    wanted = {name: shape for name, shape in wanted.items() if name not in may_lack}
+    wanted = _without_idle(wanted, found, controller)
     if name := first_difference(found, wanted):
         raise UserError(
             f"{initial.source}: its genomes have {name} of shape {found.get(name, 'none')}, "
@@ -153,14 +154,16 @@ def read_initial(folder: Path) -> Genomes | None:
         raise DamagedFile(f"{path}: damaged ({error})") from None
 
 
-def planted(state: EvolutionState, genomes: Genomes) -> EvolutionState:
+def planted(state: EvolutionState, genomes: Genomes, controller: object = None) -> EvolutionState:
     """Replace the first individuals of an unevaluated population [P]; the rest stays drawn.
+
+    controller: of the run; arrays that it needs for one observation alone may be missing.
 
     Raises:
       UserError: the genomes have other shapes.
     """
     own = by_name(state.genomes)
-    if not _shapes(genomes).items() <= _shapes(own).items():
+    if _without_idle(_shapes(own), genomes, controller) != _shapes(genomes):
         raise DamagedFile(f"{INITIAL}: its genomes do not fit the settings of this run")
     count = min(len(state.fitness), *(len(array) for array in genomes.values()))
     for name, array in genomes.items():
@@ -178,9 +181,15 @@ def _genes_of(controller: object) -> Mapping[str, Sequence[str]]:
     return found
 
 
+def _without_idle(shapes: Shapes, found: Container[str], controller: object) -> Shapes:
+    """Return the shapes without those that are not found and do nothing without an observation."""
+    idle = {name for names in _genes_of(controller).values() for name in names}
+    return {name: shape for name, shape in shapes.items() if name in found or name not in idle}
+
+
 def _joints(creature: Creature) -> tuple[str, ...]:
     return () if creature.settings.creature.grows else tuple(creature.joints.names)
 
 
-def _shapes(arrays: Mapping[str, np.ndarray | jax.ShapeDtypeStruct]) -> dict[str, tuple[int, ...]]:
+def _shapes(arrays: Mapping[str, np.ndarray | jax.ShapeDtypeStruct]) -> Shapes:
     return {name: tuple(array.shape[1:]) for name, array in arrays.items()}

@@ -169,8 +169,9 @@ def _compiled(
     def begun() -> EvolutionState:
         if restored is not None:
             return one_row(restored)
-        drawn = run.experiments[0].init()
-        return one_row(drawn if initial is None else planted(drawn, initial))
+        one = run.experiments[0]
+        drawn, controller = one.init(), one.simulator.controller
+        return one_row(drawn if initial is None else planted(drawn, initial, controller))
 
     with ThreadPoolExecutor(1) as aside:
         first = aside.submit(begun)

@@ -204,7 +204,9 @@ def test_weights_of_a_light_stay_as_drawn_after_a_task_without_one():
     state, came = follow.init(), swim.init()
     idle = swim.simulator.controller.genes_of["light"]
     genomes = {n: array for n, array in arrays_of(came.genomes).items() if n not in idle}
-    made = planted(state, genomes)
+    made = planted(state, genomes, follow.simulator.controller)
+    with pytest.raises(UserError, match="do not fit the settings"):
+        planted(state, {n: a for n, a in genomes.items() if n != "graph.half"})
     np.testing.assert_array_equal(made.genomes.nerves.steer, state.genomes.nerves.steer)
     np.testing.assert_array_equal(made.genomes.graph.half, came.genomes.graph.half)
 

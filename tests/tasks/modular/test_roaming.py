@@ -239,7 +239,7 @@ def test_jump_height_is_of_the_lowest_part_after_settling(task: Roam):
     assert jumped(again=0.3) == pytest.approx({"height": 0.3, "overlap": 0, "wild": 0})
     assert jumped() == pytest.approx({"height": 0.15, "overlap": 0, "wild": 0})
     assert jumped(settings.overlap)["overlap"] == pytest.approx(0.075)
-    assert jumped(settings.overlap / 2)["overlap"] < 0.005, "who jumps has to land"
+    assert jumped(settings.overlap / 2)["overlap"] < 0.005, "a jumper has to land"
     deep = jumped(10 * settings.overlap)
     assert deep["overlap"] < deep["height"]
     half = dataclasses.replace(
