@@ -1,5 +1,6 @@
 """Acceptance criteria of a task: the protocol, and what most tasks share."""
 
+import dataclasses
 import functools
 from collections.abc import Mapping
 from typing import Any, Protocol
@@ -27,6 +28,24 @@ from mjxgait.reference.starts import Starts
 
 Wish = Mapping[str, Any]
 """Requested targets by name, as in a champion's file; a task knows the types of its own."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Commands:
+    """Demands that change on the way, for simulations of their own.
+
+    seconds: length of each. heading: [S, T] rad, commanded; None without. lights: fields of
+    `Starts`, by name, that set lights.
+    """
+
+    seconds: float
+    heading: np.ndarray | None = None
+    lights: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Number of simulations."""
+        each = self.lights["light"] if self.heading is None else self.heading
+        return len(each)
 
 
 class AcceptanceCriteria(Protocol):
@@ -58,15 +77,15 @@ class AcceptanceCriteria(Protocol):
         ...
 
     def commands(
-        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
-    ) -> np.ndarray | None:
-        """Headings [S, T] in rad to command in separate simulations; None without steering."""
+        self, config: CertificateConfig, time_step: float, rng: np.random.Generator
+    ) -> Commands | None:
+        """Draw changing demands; None if the task has none."""
         ...
 
     def obeyed(
-        self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
+        self, outcome: Outcome, commands: Commands, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """Evaluate how these headings [S, T] were followed."""
+        """Evaluate how these were followed."""
         ...
 
     def undisturbed(
@@ -166,13 +185,13 @@ class WithoutTargets:
         return None
 
     def commands(
-        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
-    ) -> np.ndarray | None:
-        """Command no headings."""
+        self, config: CertificateConfig, time_step: float, rng: np.random.Generator
+    ) -> Commands | None:
+        """Return None."""
         return None
 
     def obeyed(
-        self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
+        self, outcome: Outcome, commands: Commands, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """Return no criteria: nothing was commanded."""
         return ()

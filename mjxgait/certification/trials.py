@@ -27,9 +27,7 @@ from mjxgait.reference.stepping import Stepping
 AIMS = 3
 """Purpose of the draw of a task's goals."""
 COMMANDS = 4
-"""Purpose of the draw of commanded turns."""
-STEERED_FOR = 12.0
-"""s, length of a steered simulation."""
+"""Purpose of the draw of commands."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -141,18 +139,23 @@ def simulate(
 def steering_criteria(
     creature: Creature, champion: Champion, config: CertificateConfig, draw: Draw, threads: int
 ) -> tuple[Criterion, ...]:
-    """Evaluate steering by drawn headings from perturbed starts; empty if none are commanded."""
+    """Evaluate drawn commands from perturbed starts; empty if the task has none."""
     acceptance, step = acceptance_of(champion.task, champion.wish), creature.model.opt.timestep
-    steps = round(STEERED_FOR / step)
-    commanded = acceptance.commands(config, steps, step, draw.generator(COMMANDS))
-    if commanded is None:
+    commands = acceptance.commands(config, step, draw.generator(COMMANDS))
+    if commands is None:
         return ()
-    begun = starts(creature, config, draw, len(commanded))
-    fall = acceptance.fall(config)
+    begun = starts(creature, config, draw, len(commands))
+    begun = dataclasses.replace(begun, **commands.lights)
     outcome = simulate(
-        creature, champion, begun, STEERED_FOR, heading=commanded, fall=fall, threads=threads
+        creature,
+        champion,
+        begun,
+        commands.seconds,
+        heading=commands.heading,
+        fall=acceptance.fall(config),
+        threads=threads,
     )
-    return acceptance.obeyed(outcome, commanded, config)
+    return acceptance.obeyed(outcome, commands, config)
 
 
 def rehearse(

@@ -169,11 +169,12 @@ class Bodies:
         one. goal: [rows] m ahead of the start.
         """
         creature, velocity = self.creature, self.qvel[rows]
+        time = np.full(len(rows), step * creature.model.opt.timestep)
         rot, root = self.xmat[rows, creature.trunk].reshape(-1, 3, 3), self.layout.root_dof
         return State(
             start=self.start,
             ground=self.terrain,
-            time=np.full(len(rows), step * creature.model.opt.timestep),
+            time=time,
             joint_pos=self.qpos[rows[:, None], creature.joints.qpos_adr],
             velocity=velocity,
             trunk_pos=self.xpos[rows, creature.trunk],
@@ -186,7 +187,7 @@ class Bodies:
             mass_matrix=self.layout.dense(self.mass[rows]),
             bias=self.bias[rows] - self.passive[rows],
             constraint_force=self.last_force[rows],
-            light=self.light(rows),
+            light=self.light(rows, time),
             goal=goal,
             bar=self.starts.bar[rows, 0],
         )
@@ -206,11 +207,15 @@ class Bodies:
             return np.zeros((len(rows), 0, 3))
         return foot_middles(self.creature, self.geom_xpos[rows])
 
-    def light(self, rows: np.ndarray) -> np.ndarray:
-        """Return the light's direction [rows, F, 3] in each foot's own axes; empty if unused."""
+    def light(self, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """Return the light's direction [rows, F, 3] in each foot's own axes; empty if unused.
+
+        time: [rows] s.
+        """
         if not self.sees_light:
             return np.zeros((len(rows), 0, 3))
-        light = self.starts.light[rows][:, None]
+        starts, moved = self.starts, (time >= self.starts.light_time[rows])[:, None]
+        light = np.where(moved, starts.moved_light[rows], starts.light[rows])[:, None]
         there = self.start.place + light - self.geom_xpos[rows][:, self.feet.geoms]
         there = np.where(light.any(2, keepdims=True), there, 0.0)
         there /= np.maximum(np.linalg.norm(there, axis=2, keepdims=True), 1e-9)

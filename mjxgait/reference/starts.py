@@ -27,6 +27,7 @@ class Starts:
     end: [S] s at which the run stops; one still up then has stayed up. Infinite: never early.
     goal: [S] m ahead of the start; 0 if the task has none.
     light: [S, 3] m from the trunk's start; 0 if there is none.
+    moved_light: [S, 3] m, the light from `light_time` on, s [S]; infinite: it does not move.
     bar: [S, 2] m ahead of the start and above the floor, lower edge of the bar; infinite if the
       task has none.
     refine: [S] physics steps per control step; the controller is unchanged and its torque is held
@@ -47,6 +48,8 @@ class Starts:
     end: np.ndarray
     goal: np.ndarray
     light: np.ndarray
+    moved_light: np.ndarray
+    light_time: np.ndarray
     bar: np.ndarray
     refine: np.ndarray
 
@@ -96,6 +99,8 @@ def nominal_starts(creature: Creature, count: int) -> Starts:
         end=np.full(count, np.inf),
         goal=np.zeros(count),
         light=np.zeros((count, 3)),
+        moved_light=np.zeros((count, 3)),
+        light_time=np.full(count, np.inf),
         bar=np.full((count, 2), np.inf),
         refine=np.ones(count, dtype=int),
     )

@@ -10,6 +10,7 @@ from certify_made_up import walk
 
 from mjxgait.api import load_creature
 from mjxgait.certification import CertificateConfig
+from mjxgait.certification.acceptance import Commands
 from mjxgait.reference.bodies import Water
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
@@ -160,6 +161,36 @@ def test_follow_is_decided_by_the_centre_of_mass_from_2_s_on():
     for drag in (500.0, 0.0):
         found = FollowCriteria(drag).succeeded(outcome, starts, CONFIG)
         assert found.tolist() == [True, False, False, False]
+
+
+@pytest.mark.parametrize("drag", [500.0, 0.0])
+def test_a_light_moves_to_another_side(drag: float):
+    criteria = FollowCriteria(drag)
+    commands = criteria.commands(CONFIG, STEP, np.random.default_rng(0))
+    light, moved = commands.lights["light"], commands.lights["moved_light"]
+    np.testing.assert_allclose(np.linalg.norm([light, moved], axis=2), 10.0)
+    assert len(commands) == CONFIG.follow.moved
+    assert ((light * moved).sum(1) <= 0).all()
+    assert commands.seconds == CONFIG.follow.moves + CONFIG.seconds
+    assert (light[:, 2] == 0).all() == (moved[:, 2] == 0).all() == (drag == 0)
+
+
+@pytest.mark.parametrize(
+    ("speed", "passes"), [(0.11, True), (0.09, False), (-0.11, False)], ids=str
+)
+def test_after_the_move_the_light_is_approached_as_fast(speed: float, passes: bool):
+    """What comes before 2 s after the move does not count."""
+    lights = {"light": np.tile([10.0, 0.0, 0.0], (4, 1))}
+    lights |= {"moved_light": np.tile([0.0, 10.0, 0.0], (4, 1)), "light_time": np.full(4, 10.0)}
+    times = np.arange(round((10 + CONFIG.seconds) / STEP)) * STEP
+    way = np.minimum(times, 12.0)[:, None] * [0.3, -0.3, 0.0]
+    way = way + np.maximum(times - 12.0, 0.0)[:, None] * np.array([0.0, speed, 0.0])
+    outcome = disturbed(np.tile(way, (4, 1, 1)))
+    (criterion,) = FollowCriteria(500.0).obeyed(outcome, Commands(32.0, lights=lights), CONFIG)
+    assert (criterion.number, criterion.passed) == (12, passes)
+    outcome.fell[:2] = 20.0
+    (criterion,) = FollowCriteria(500.0).obeyed(outcome, Commands(32.0, lights=lights), CONFIG)
+    assert not criterion.passed, "the episodes of half of them ended early"
 
 
 def test_the_measured_push_is_the_force_of_the_water():

@@ -8,7 +8,7 @@ from certify_made_up import DOG, make_champion, walk
 from test_certify_measures import failed
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.acceptance import acceptance_of
+from mjxgait.certification.acceptance import Commands, acceptance_of
 from mjxgait.certification.trials import simulate
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
@@ -156,7 +156,7 @@ def test_commands_start_straight_and_turn_both_ways():
     assert ((abs(rates) >= 15.0) & (abs(rates) <= 30.0)).all()
     assert (rates > 0).sum() == 16
     assert len(np.unique(rates)) == 32
-    assert acceptance_of("walk", {"turn": 30.0}).commands(CONFIG, 9, STEP, None) is None
+    assert acceptance_of("walk", {"turn": 30.0}).commands(CONFIG, STEP, None) is None
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,8 @@ def test_commands_start_straight_and_turn_both_ways():
     ids=["soon", "three fall", "four fall", "late", "near", "off"],
 )
 def test_steering_keeps_the_commanded_heading(outcome: Outcome, passes: bool):
-    (criterion,) = acceptance_of("walk", {"steer": 30.0}).obeyed(outcome, told(), CONFIG)
+    acceptance, commands = acceptance_of("walk", {"steer": 30.0}), Commands(12.0, told())
+    (criterion,) = acceptance.obeyed(outcome, commands, CONFIG)
     assert (criterion.number, criterion.passed) == (11, passes)
 
 

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 from typing_extensions import override
 
+from mjxgait.certification.acceptance import Commands
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, at_least
 from mjxgait.champion import Champion
@@ -28,7 +29,7 @@ class FollowCriteria(ModularCriteria):
 
     def __init__(self, drag: float) -> None:
         self.drag = drag
-        self.revision = 1 if drag else 2
+        self.revision = 2 if drag else 3
         self.axes = 3 if drag else 2
 
     @override
@@ -65,10 +66,8 @@ class FollowCriteria(ModularCriteria):
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
         """A light for each simulation without one, the nominal one ahead."""
-        ahead = np.tile([1.0, 0.0, 0.0], (len(starts), 1))
-        drawn = ahead if rng is None else rng.normal(size=(len(starts), 3))
-        drawn[:, self.axes :] = 0.0
-        drawn *= LIGHT / np.linalg.norm(drawn, axis=1, keepdims=True)
+        ahead = np.array([LIGHT, 0.0, 0.0])
+        drawn = ahead if rng is None else self._directions(len(starts), rng)
         return dataclasses.replace(
             starts, light=np.where(starts.light.any(1, keepdims=True), starts.light, drawn)
         )
@@ -79,6 +78,33 @@ class FollowCriteria(ModularCriteria):
         apart = (middle - starts.light[:, None])[..., : self.axes]
         nearer = approach(apart, outcome.trajectory.time_step)
         return outcome.stayed_up & (nearer >= config.follow.speed)
+
+    def commands(
+        self, config: CertificateConfig, time_step: float, rng: np.random.Generator
+    ) -> Commands:
+        """Draw lights that move once, by a right angle or more as seen from the start."""
+        count, moves = config.follow.moved, config.follow.moves
+        light, other = self._directions(count, rng), self._directions(count, rng)
+        other *= -np.copysign(1.0, (light * other).sum(1, keepdims=True))
+        lights = {"light": light, "moved_light": other, "light_time": np.full(count, moves)}
+        return Commands(moves + config.seconds, lights=lights)
+
+    def obeyed(
+        self, outcome: Outcome, commands: Commands, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """Evaluate criterion 12: after the move the light is approached as fast."""
+        time_step, light = outcome.trajectory.time_step, commands.lights["moved_light"]
+        since = round((config.follow.moves + config.warmup) / time_step)
+        apart = (outcome.middle[:, since:] - light[:, None])[..., : self.axes]
+        well = outcome.stayed_up & (approach(apart, time_step) >= config.follow.speed)
+        share = at_least("share that follows", float(well.mean()), config.follow.arrive, 1.0)
+        return (Criterion(12, "a light that moves", (share,)),)
+
+    def _directions(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        drawn = rng.normal(size=(count, 3))
+        drawn[:, self.axes :] = 0.0
+        lights: np.ndarray = LIGHT * drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+        return lights
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
         """The approach in m due in all seconds, made in those that count."""

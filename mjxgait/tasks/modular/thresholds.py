@@ -7,6 +7,7 @@ import pydantic
 
 from mjxgait.config.tables import (
     STRICT,
+    Count,
     Fraction,
     NonNegative,
     Positive,
@@ -91,8 +92,12 @@ class FollowThresholds(BlocksThresholds):
     Attributes:
       speed: m/s, least, of the approach to the light.
       arrive: share of the perturbed starts, each with its own light, that must succeed.
+      moves: s, time at which the light moves to another side in simulations of their own.
+      moved: number of these.
     """
 
     __pydantic_config__ = STRICT
     speed: NonNegative = 0.1
     arrive: Fraction = 0.75
+    moves: Positive = 10.0
+    moved: Count = 32

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from typing_extensions import override
 
-from mjxgait.certification.acceptance import StaysUp, Wish, to_the_end
+from mjxgait.certification.acceptance import Commands, StaysUp, Wish, to_the_end
 from mjxgait.certification.config import (
     CertificateConfig,
     GaitConfig,
@@ -64,6 +64,8 @@ from mjxgait.tasks.walk.target_criteria import (
 SPARE = 1.2
 """Factor over the certificate's minimum speed at which a gait in evolution is worth validating."""
 
+STEERED_FOR = 12.0
+"""s, length of a steered simulation."""
 
 STARTED = (0.75, 1.15)
 """Range of the distance in evolution, over that at the target speed, that is worth validating.
@@ -94,17 +96,20 @@ class WalkCriteria(StaysUp):
 
     @override
     def commands(
-        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
-    ) -> np.ndarray | None:
+        self, config: CertificateConfig, time_step: float, rng: np.random.Generator
+    ) -> Commands | None:
         if "steer" not in self.wish:
             return None
-        return draw_commands(self.wish["steer"], config.wishes.commands, steps, time_step, rng)
+        steps, count = round(STEERED_FOR / time_step), config.wishes.commands
+        heading = draw_commands(self.wish["steer"], count, steps, time_step, rng)
+        return Commands(STEERED_FOR, heading)
 
     def obeyed(
-        self, outcome: Outcome, commanded: np.ndarray, config: CertificateConfig
+        self, outcome: Outcome, commands: Commands, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """Evaluate criterion 11."""
-        return (steered(outcome, commanded, config.wishes),)
+        assert commands.heading is not None
+        return (steered(outcome, commands.heading, config.wishes),)
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig

@@ -99,12 +99,18 @@ def test_reference_light_direction_is_in_each_blocks_own_axes(experiment: Experi
     champion = experiment.champion(first, {})
     body, light = champion.embodied(experiment.creature), np.array([3.0, -4.0, 1.0])
     task = acceptance_of("follow-on-land")
-    start = dataclasses.replace(nominal_starts(body, 2), light=np.stack([light, 0 * light]))
+    start = dataclasses.replace(
+        nominal_starts(body, 3),
+        light=np.stack([light, 0 * light, -light]),
+        moved_light=np.stack([0 * light, 0 * light, light]),
+        light_time=np.array([1.1, np.inf, 0.9]),
+    )
     bodies = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task).bodies
     bodies.qpos[:, 3:7] = [0.5, -0.5, 0.1, 0.7]
     bodies.batch.forward(stage=VELOCITY_STAGE)
-    seen, dark = bodies.light(np.arange(2))
+    seen, dark, moved = bodies.light(np.arange(3), np.ones(3))
     assert not dark.any()
+    np.testing.assert_array_equal(moved, seen)
     data = mujoco.MjData(body.model)
     data.qpos[:] = bodies.qpos[0]
     mujoco.mj_kinematics(body.model, data)
