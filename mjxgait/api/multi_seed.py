@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mjxgait.api.progress import Progress, pace
-from mjxgait.experiments.multi_seed import bests, draw_zoo, found_in, read_seeds, size, table
+from mjxgait.experiments.multi_seed import bests, read_seeds
 from mjxgait.files import replaced
 from mjxgait.output import Output
 from mjxgait.training.disk import disk_errors
@@ -70,6 +70,8 @@ def evolve_zoo(
 
 
 def _leave(zoo: Path, name: str, folders: list[Path], output: Output) -> None:
+    # Matplotlib takes half a second to import.
+    from mjxgait.experiments.seeds_compared import draw_zoo, found_in, size, table
     from mjxgait.rendering.curves import figure
 
     found = found_in(folders)

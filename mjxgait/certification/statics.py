@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from scipy.optimize import linprog, lsq_linear
 
 from mjxgait.creature import Creature
 from mjxgait.creature.creature import FLOOR, vertical_freedom
@@ -137,6 +136,8 @@ class Statics:
 
     def _weights(self) -> np.ndarray:
         """Share the weight between the contacts, as evenly between feet as the balance allows."""
+        from scipy.optimize import lsq_linear  # slow to import, and few runs need it
+
         centre, hip = self.data.subtree_com[self.creature.trunk], self.creature.frame.hip_height
         count = len(self.points)
         if not count:
@@ -153,6 +154,8 @@ class Statics:
 
         A linear program over the weight on each point and the largest share of the limits.
         """
+        from scipy.optimize import linprog  # slow to import, and few runs need it
+
         weight = self.creature.frame.mass * self.creature.gravity
         carried = min(IN_A_STEP * float(self.weights[points].sum()), weight)
         limits = self.creature.gains.torque_limit[leg.joints]

@@ -160,7 +160,7 @@ def test_repeated_jumps_from_perturbed_starts_succeed():
 
 
 def test_certificates_by_earlier_rules_are_outdated():
-    for task, version in (("walk", 4), ("hop", 2), ("swim", 3), ("jump", 3), ("follow", 3)):
+    for task, version in (("walk", 4), ("hop", 2), ("swim", 3), ("jump", 3), ("follow", 4)):
         assert schema_of(task) == version
         champion: Any = SimpleNamespace(task=task, fingerprint="same")
         document = {"champion": "same", "schema": 2, "task": task}

@@ -18,8 +18,9 @@ from mjxgait.champion import write_champion
 from mjxgait.creature import Creature
 from mjxgait.distributed.rows import Rows
 from mjxgait.distributed.scheduler import Scheduler
-from mjxgait.experiments.multi_seed import create_zoo, folders_of, found_in, read_seeds
+from mjxgait.experiments.multi_seed import create_zoo, folders_of, read_seeds
 from mjxgait.experiments.repertoire.grid import POSES
+from mjxgait.experiments.seeds_compared import found_in
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
