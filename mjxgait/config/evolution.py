@@ -242,6 +242,14 @@ class EvolutionConfig:
         if self.elites >= self.offspring:
             raise ValueError(f"elite = {self.elite} leaves no room for children")
 
+    def patient(self) -> "EvolutionConfig":
+        """Return the settings without an end because forced phases fail."""
+        return dataclasses.replace(self, forced=dataclasses.replace(self.forced, patience=0))
+
+    def unstopped(self) -> "EvolutionConfig":
+        """Return the settings without any end before the last generation."""
+        return dataclasses.replace(self.patient(), target=None)
+
     @property
     def follows(self) -> bool:
         """Return whether mothers are recorded; children that a strategy draws have none."""

@@ -196,8 +196,7 @@ class _Islands:
         self.creature = creature = examiner.experiment.creature
         config = examiner.experiment.config
         # A stuck island does not stop the run: others may still improve.
-        forced = dataclasses.replace(config.evolution.forced, patience=0)
-        evolution = dataclasses.replace(config.evolution, forced=forced)
+        evolution = config.evolution.patient()
         self.config = dataclasses.replace(config, evolution=evolution)
         self.settings, self.recipe = evolution.islands, Recipe.of(creature, [self.config])
         self.places = [folder / ISLANDS / str(i) for i in range(self.settings.count)]

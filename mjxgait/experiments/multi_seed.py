@@ -103,10 +103,10 @@ def create_zoo(
 
 def to_the_last(config: Config) -> Config:
     """Return the config without early stopping: the rows of a program advance together."""
-    forced = dataclasses.replace(config.evolution.forced, patience=0)
     examination = dataclasses.replace(config.examination, every=0)
-    evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
-    return dataclasses.replace(config, evolution=evolution, examination=examination)
+    return dataclasses.replace(
+        config, evolution=config.evolution.unstopped(), examination=examination
+    )
 
 
 def bests(lines: Sequence[Line]) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from mjxgait.errors import listed
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.notes import Notes
-from mjxgait.importer.soles import Stance
+from mjxgait.importer.soles import Stance, lowest_part
 from mjxgait.importer.stance import stance_of
 
 GRAVITY = 9.81
@@ -218,7 +218,7 @@ def _roles(
 ) -> tuple[list[str], np.ndarray]:
     """Role of each joint, and the mean motion [J, 3] m/rad that it gives its feet."""
     soles = kinematics.sole_points(*kinematics.pose(q))
-    middles = [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * stance.hip].mean(0) for sole in soles]
+    middles = [lowest_part(sole, stance.hip).mean(0) for sole in soles]
     moves = np.array([kinematics.jacobian(f, middle) for f, middle in enumerate(middles)])
     carried = np.abs(moves).sum(2) > 0
     mean = moves.sum(0) / np.maximum(carried.sum(0), 1)[:, None]

@@ -23,6 +23,12 @@ UPPER_END = "_upper_end"
 """In the names of balls at the upper ends of capsules on which the creature stands."""
 
 
+def lowest_part(sole: np.ndarray, hip: float) -> np.ndarray:
+    """Points of a sole [n, 3] near its lowest; hip: hip height in m."""
+    near: np.ndarray = sole[sole[:, 2] < sole[:, 2].min() + BAND * hip]
+    return near
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stance:
     """Bodies in the standing pose, the creature facing +x.

@@ -9,7 +9,7 @@ import numpy as np
 
 from mjxgait.creature.geometry import rotation
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.soles import Stance
+from mjxgait.importer.soles import Stance, lowest_part
 
 
 class Sampling(NamedTuple):
@@ -161,7 +161,7 @@ class Search:
         up = np.array([0.0, 0.0, 1.0])
         found = {}
         for f, sole in enumerate(self.kinematics.sole_points(stance.xpos, stance.xrot)):
-            low = sole[sole[:, 2] < sole[:, 2].min() + 0.03 * self.hip]
+            low = lowest_part(sole, self.hip)
             broad = len(low) > 1 and np.ptp(low[:, :2], axis=0).max() > 0.12 * self.hip
             if broad and all(tip.far.all() for tip in self.kinematics.tips[f]):
                 found[f] = stance.xrot[self.kinematics.feet[f][0]].T @ (
@@ -213,23 +213,12 @@ class Search:
         soles = kinematics.sole_points(xpos, xrot)
         lows = np.array([sole[:, 2].min() for sole in soles])
         floor = float(lows.min())
-        middles = np.array(
-            [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * hip].mean(0) for sole in soles]
-        )
+        middles = np.array([lowest_part(sole, hip).mean(0) for sole in soles])
         off = (kinematics.centre_of_mass() - middles.mean(0))[:2] / hip
         others = [kinematics.lowest(xpos, xrot, s) - floor for s in self.segments]
         others.append(kinematics.shank_height(xpos, xrot) - floor)
         crouched = sum(max(0.2 - h / hip, 0.0) for h in others)
-        stretched = beneath = narrow = ahead = 0.0
-        for f, leg in enumerate(self.legs):
-            anchors = kinematics.data.xanchor[[j + 1 for j in leg]]
-            path = np.concatenate([anchors, middles[f][None]])
-            beneath += max(float(np.linalg.norm(path[-1][:2] - path[0][:2])) / hip - 0.3, 0.0)
-            ahead += (float(path[-1][0] - path[0][0]) / hip) ** 2
-            side = float(anchors[np.abs(anchors[:, 1]).argmax(), 1])
-            narrow += max(abs(side) - float(middles[f][1]) * np.sign(side), 0.0) / hip
-            ratio = straightness(path)
-            stretched += max(ratio - 0.94, 0.0) + max(0.75 - ratio, 0.0)
+        stretched, beneath, narrow, ahead = self._of_legs(middles)
         near = (
             np.maximum(MARGIN - np.minimum(q - kinematics.low, kinematics.high - q), 0.0) / MARGIN
         )
@@ -253,3 +242,22 @@ class Search:
             + 5 * low_trunk
             + 0.2 * ((q - self.start) ** 2).mean()
         )
+
+    def _of_legs(self, middles: np.ndarray) -> tuple[float, float, float, float]:
+        """Sums over the legs in the latest pose; middles: [F, 3] m, of the soles.
+
+        How far legs are stretched or folded, feet beside their hips, feet within the hips, and
+        feet before or behind them (squared); lengths in hip heights.
+        """
+        stretched = beneath = narrow = ahead = 0.0
+        for middle, leg in zip(middles, self.legs, strict=True):
+            anchors = self.kinematics.data.xanchor[[j + 1 for j in leg]]
+            path = np.concatenate([anchors, middle[None]])
+            off = (middle - anchors[0])[:2]
+            beneath += max(float(np.linalg.norm(off)) / self.hip - 0.3, 0.0)
+            ahead += (float(off[0]) / self.hip) ** 2
+            side = float(anchors[np.abs(anchors[:, 1]).argmax(), 1])
+            narrow += max(abs(side) - float(middle[1]) * np.sign(side), 0.0) / self.hip
+            ratio = straightness(path)
+            stretched += max(ratio - 0.94, 0.0) + max(0.75 - ratio, 0.0)
+        return stretched, beneath, narrow, ahead

@@ -16,13 +16,12 @@ class Held:
     """Result of a stand test.
 
     up: least product of the trunk's upright axis with the world's. height: least, in standing
-    heights. moved: m. sag: rad. speed: rad/s, root mean square of the joints at the end. touched: a
+    heights. sag: rad. speed: rad/s, root mean square of the joints at the end. touched: a
     part that touched the floor and may not, or "".
     """
 
     up: float
     height: float
-    moved: float
     sag: float
     speed: float
     touched: str
@@ -101,18 +100,16 @@ def hold(
         data.qfrc_applied[6:] = np.clip(torque, -limit, limit)
         mujoco.mj_step2(model, data)
         if not np.isfinite(data.qpos).all() or np.abs(data.qvel).max() > 1e3:
-            return Held(-1.0, 0.0, 0.0, 9.0, 9.0, touched)
+            return Held(-1.0, 0.0, 9.0, 9.0, touched)
         up = min(up, float((data.xmat[1].reshape(3, 3) @ up_axis)[2]))
         height = min(height, float(data.xpos[1][2] / max(start[2], 1e-9)))
         touched = touched or _touching(model, data, may_touch)
         if up < 0.3:
             break
     error = data.qpos[7:] - goal
-    moved = float(np.linalg.norm(data.xpos[1][:2] - start[:2]))
     return Held(
         up,
         height,
-        moved,
         float(np.sqrt((error**2).mean())),
         float(np.sqrt((data.qvel[6:] ** 2).mean())),
         touched,

@@ -173,13 +173,8 @@ def measure(
     start = start_frame(creature)
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
     bar = None if aimed is None or np.isinf(aimed.bar[row, 0]) else aimed.bar[row]
-    lit = aimed is not None and aimed.light[row].any()
-    sight = Sight(creature, len(qpos), bar)
-    for k in range(len(qpos)):
-        if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
-            break
-        sight.look(k, qpos[k], qvel[k], torque[k])
-    sight.finish()
+    light = None if aimed is None or not aimed.light[row].any() else aimed.light[row]
+    sight = _replayed(creature, qpos, qvel, torque, bar)
     forward, left, up = (
         sight.trunk_rot @ axis
         for axis in (creature.frame.forward, creature.frame.left, creature.frame.up)
@@ -209,10 +204,27 @@ def measure(
         overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
         goal=0.0 if aimed is None else float(aimed.goal[row]),
         clearance=None if bar is None else sight.clearance,
-        light=start.place + aimed.light[row] if aimed is not None and lit else None,
+        light=None if light is None else start.place + light,
         grown=None if drag is None else seen_grown(creature, qpos, qvel, drag),
         foot_ahead=_ahead(sight),
     )
+
+
+def _replayed(
+    creature: Creature,
+    qpos: np.ndarray,
+    qvel: np.ndarray,
+    torque: np.ndarray,
+    bar: np.ndarray | None,
+) -> Sight:
+    """Set every frame [T] in C MuJoCo, up to the first that is not finite."""
+    sight = Sight(creature, len(qpos), bar)
+    for k in range(len(qpos)):
+        if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
+            break
+        sight.look(k, qpos[k], qvel[k], torque[k])
+    sight.finish()
+    return sight
 
 
 def _ahead(sight: Sight) -> np.ndarray:

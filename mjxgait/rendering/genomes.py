@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mjxgait.champion import Champion
-from mjxgait.controllers.expressions.text import ADDED, Expression, nested, terminals
+from mjxgait.controllers.expressions.text import Expression, every_terminal, nested
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.reference_body import Part, grow
 from mjxgait.creature import Creature
@@ -72,7 +72,7 @@ def _lay(expression: Expression, first: int, depth: int, nodes: list[Node]) -> t
 
 def expressions_of(creature: Creature, champion: Champion) -> Mapping[str, Expression]:
     """Return a champion's expressions by joint."""
-    known, genome = terminals(creature, tuple(ADDED.values())), champion.genome
+    known, genome = every_terminal(creature), champion.genome
     rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
     return {joint: nested(code, value, known) for joint, code, value in rows}
 

@@ -173,15 +173,6 @@ class Simulator:
             )
             return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
 
-        def store(results: EpisodeStats, place: jax.Array, stats: EpisodeStats) -> EpisodeStats:
-            return jax.tree.map(
-                lambda rows, leaf: rows.at[place].set(
-                    jnp.moveaxis(leaf, self.plant.lane_axis, 0), mode="drop"
-                ),
-                results,
-                stats,
-            )
-
         def body(
             carry: tuple[Lane, EpisodeStats, jax.Array, jax.Array],
         ) -> tuple[Lane, EpisodeStats, jax.Array, jax.Array]:
@@ -189,7 +180,7 @@ class Simulator:
             lane = jax.lax.fori_loop(0, CHECK_EVERY, self._step, lane)
             lane = self._look_for_overlap(lane)
             done = (lane.stats.steps >= self.steps) | (lane.stats.reason != Reason.FINISHED)
-            results = store(results, jnp.where(done, lane.job, queue), lane.stats)
+            results = self._stored(results, jnp.where(done, lane.job, queue), lane.stats)
             lane = self._per_lane(choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
             return lane, results, taken + jnp.sum(done), rounds + 1
 
@@ -198,19 +189,31 @@ class Simulator:
         )
         carry = (fresh(jnp.arange(lanes)), results, jnp.int32(lanes), jnp.int32(0))
         # Not a while_loop: XLA's CPU compiler aborts on the lane_major kernels in a loop of unknown
-        # length. A free lane always takes a job, so this many rounds suffice (Graham 1966); rounds
-        # left over cost next to nothing.
-        longest = -(-self.steps // CHECK_EVERY) + 1
-        most = -(-queue * longest // lanes) + longest
+        # length. Rounds left over cost next to nothing.
         carry = jax.lax.fori_loop(
             0,
-            most,
+            self._most_rounds(queue, lanes),
             lambda _, carry: jax.lax.cond(
                 jnp.any(carry[0].job < queue), body, lambda same: same, carry
             ),
             carry,
         )
         return carry[1], (carry[3] * (CHECK_EVERY * lanes))[None]
+
+    def _stored(self, results: EpisodeStats, place: jax.Array, stats: EpisodeStats) -> EpisodeStats:
+        """Write the lanes' statistics at their places in the queue; places outside are dropped."""
+        return jax.tree.map(
+            lambda rows, leaf: rows.at[place].set(
+                jnp.moveaxis(leaf, self.plant.lane_axis, 0), mode="drop"
+            ),
+            results,
+            stats,
+        )
+
+    def _most_rounds(self, queue: int, lanes: int) -> int:
+        """Rounds that suffice for a queue: a free lane always takes a job (Graham 1966)."""
+        longest = -(-self.steps // CHECK_EVERY) + 1
+        return -(-queue * longest // lanes) + longest
 
     def _fresh_lane(
         self,
@@ -297,14 +300,10 @@ class Simulator:
         depth = self.plant.overlap(lane.body)
         return dataclasses.replace(lane, stats=deepened(lane.stats, depth, self.steps))
 
-    def reason(self, sensed: Sensed, goal: object) -> jax.Array:
-        """Return why [] an episode ends now; `Reason.FINISHED` while it goes on."""
-        return reason_of(self.task, sensed, goal)
-
     def _evaluate(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
         """Update the statistics after a step, unless the episode has ended."""
         stats, going = lane.stats, is_going(lane.stats, self.steps)
-        reason = self.reason(sensed, lane.goal)
+        reason = reason_of(self.task, sensed, lane.goal)
         updated = self.task.update(stats, sensed, torque, lane.params, lane.goal)
         kept = dataclasses.replace(stats, reason=jnp.where(going, reason, stats.reason))
         return choose(going & (reason == Reason.FINISHED), updated, kept)

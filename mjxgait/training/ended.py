@@ -57,8 +57,7 @@ def _stopped(config: Config, stored: Stored) -> str | None:
     """Return why evolution stops; with islands, failed forced phases end no run."""
     evolution = config.evolution
     if evolution.islands.count > 1:
-        forced = dataclasses.replace(evolution.forced, patience=0)
-        evolution = dataclasses.replace(evolution, forced=forced)
+        evolution = evolution.patient()
     state = cast(EvolutionState, SimpleNamespace(**stored.arrays))
     return stop_reason(state, evolution)
 

@@ -113,7 +113,7 @@ def _train(
         screen.say(experiment.plant_note)
     if prescreen := prescreen_of(experiment):
         prescreen.begin()
-    with screen.compiling(creature.name, experiment):
+    with screen.compiling(creature.name, experiment.config):
         generations = _compiled(Batch((experiment,)), evaluator, restored, read_initial(folder))
     began = time.perf_counter()
     examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS), prescreen)

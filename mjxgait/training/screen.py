@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -29,9 +28,6 @@ from mjxgait.training.folder import (
     command,
 )
 
-if TYPE_CHECKING:
-    from mjxgait.training.experiment import Experiment
-
 
 class Screen(Output):
     """Prints the progress of one run.
@@ -52,9 +48,8 @@ class Screen(Output):
         self._first: tuple[float, int] | None = None
 
     @contextmanager
-    def compiling(self, what: str, experiment: "Experiment") -> Iterator[None]:
+    def compiling(self, what: str, config: Config) -> Iterator[None]:
         """Show that the program is being compiled, and the time it takes."""
-        config = experiment.config
         self.say(
             f"{what}: population {config.evolution.population}, {config.rollout.starts} starts of "
             f"{config.rollout.seconds:g} s, seed {config.seed}"

@@ -21,7 +21,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
 from mjxgait.simulation.evaluator import Local
-from mjxgait.simulation.rollout import Episodes
+from mjxgait.simulation.rollout import Episodes, reason_of
 from mjxgait.tasks.base import in_order
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import NEVER, Starts, draw_starts
@@ -206,7 +206,7 @@ def reason_to_end(
         trunk_pos=jnp.array([0.0, 0.0, height * experiment.creature.frame.stand_height]),
         trunk_rot=jnp.array(turned),
     )
-    return Reason(int(experiment.simulator.reason(sensed, ())))
+    return Reason(int(reason_of(experiment.simulator.task, sensed, ())))
 
 
 WRONG = {

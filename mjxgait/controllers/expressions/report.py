@@ -9,9 +9,8 @@ from typing_extensions import override
 
 from mjxgait.champion import serializer_of
 from mjxgait.controllers.expressions.text import (
-    ADDED,
     EMPTY,
-    terminals,
+    every_terminal,
     to_text,
 )
 from mjxgait.inspect.sections import GenomeView, title, titled_table
@@ -76,7 +75,7 @@ class ProgramView(GenomeView):
 
 
 def _texts(snapshot: Snapshot, i: int) -> dict[str, str]:
-    known = terminals(snapshot.creature, tuple(ADDED.values()))
+    known = every_terminal(snapshot.creature)
     rows = zip(snapshot.genomes["code"][i], snapshot.genomes["value"][i], strict=True)
     texts = (to_text(code, value, known) for code, value in rows)
     return dict(zip(snapshot.creature.joints.names, texts, strict=True))

@@ -16,9 +16,9 @@ from mjxgait.controllers.expressions.parse import (
     to_arrays,
 )
 from mjxgait.controllers.expressions.text import (
-    ADDED,
     HasParts,
     chosen_terminals,
+    every_terminal,
     in_text,
     nested,
     simplified,
@@ -36,7 +36,7 @@ class ExpressionSerializer(PlainSerializer[ProgramConfig]):
         self, genome: Mapping[str, np.ndarray], settings: ProgramConfig, creature: Creature
     ) -> dict[str, object]:
         """Implementation of `Serializer`. expressions: by joint. nodes: most per expression."""
-        known = terminals(creature, tuple(ADDED.values()))
+        known = every_terminal(creature)
         rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
         return {
             "expressions": {name: to_text(code, value, known) for name, code, value in rows},
@@ -47,7 +47,7 @@ class ExpressionSerializer(PlainSerializer[ProgramConfig]):
         self, genome: Mapping[str, np.ndarray], creature: Creature
     ) -> dict[str, np.ndarray]:
         """Simplified, then written as text and read back."""
-        known, nodes = terminals(creature, tuple(ADDED.values())), genome["code"].shape[1]
+        known, nodes = every_terminal(creature), genome["code"].shape[1]
         pairs = zip(genome["code"], genome["value"], strict=True)
         rows = []
         for code, value in pairs:
@@ -58,7 +58,7 @@ class ExpressionSerializer(PlainSerializer[ProgramConfig]):
 
     @override
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
-        known, nodes = terminals(creature, tuple(ADDED.values())), int(document["nodes"])
+        known, nodes = every_terminal(creature), int(document["nodes"])
         if not 1 <= nodes <= MOST_NODES:
             raise ValueError(f"nodes = {nodes}: an expression has 1 to {MOST_NODES}")
         texts = document["expressions"]
@@ -130,6 +130,6 @@ def programs_to_begin_with(
 
 def program_text(body: HasParts, program: tuple[np.ndarray, np.ndarray]) -> str:
     """Return a program, code and value [J, C], as `(list EXPRESSION ...)`."""
-    known = terminals(body, tuple(ADDED.values()))
+    known = every_terminal(body)
     rows = [to_text(code, value, known) for code, value in zip(*program, strict=True)]
     return f"(list {' '.join(rows)})"

@@ -83,7 +83,12 @@ SCALARS = {
 }
 
 
-def terminals(body: HasParts, added: Sequence[str] = ()) -> tuple[Terminal, ...]:
+def every_terminal(body: HasParts) -> tuple[Terminal, ...]:
+    """Return the inputs from a body and from all tasks."""
+    return terminals(body, tuple(ADDED.values()))
+
+
+def terminals(body: HasParts, added: Sequence[str]) -> tuple[Terminal, ...]:
     """Return the inputs from a body, and from named observations that a task adds (`added`)."""
     rows: list[tuple[str, str, int | None]] = [(n, sense, None) for n, sense in SCALARS.items()]
     for j in range(len(body.joints.names)):

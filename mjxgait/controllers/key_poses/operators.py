@@ -27,26 +27,17 @@ def pose_variation(box: Box, config: EvolutionConfig) -> "Variation[Genome]":
     """
     poses = narrowed(box, config.pose_range)
     box = Box(
-        *(
-            dataclasses.replace(edge, key_poses=part.key_poses)
-            for edge, part in ((box.low, poses.low), (box.high, poses.high))
-        )
+        dataclasses.replace(box.low, key_poses=poses.low.key_poses),
+        dataclasses.replace(box.high, key_poses=poses.high.key_poses),
     )
     middle = narrowed(box, config.initial_spread)
 
     def cross(key: jax.Array, mother: "Genome", father: "Genome") -> "Genome":
         key_poses, key_tuning = jax.random.split(key)
-        permuted, aligned = (
-            f(key_poses, mother.key_poses, father.key_poses)
-            for f in (permuted_poses, aligned_poses)
-        )
         from_mother = jax.random.bernoulli(key_tuning, 0.5, mother.tuning.shape)
-        key_which = jax.random.fold_in(key_poses, 1)
-        mixes = chosen(config.crossing, "mixed") & jax.random.bernoulli(key_which, config.permuted)
-        permutes = chosen(config.crossing, "permute") | mixes
         return dataclasses.replace(
             mother,
-            key_poses=jnp.where(permutes, permuted, aligned),
+            key_poses=crossed_poses(key_poses, mother.key_poses, father.key_poses, config),
             tuning=jnp.where(from_mother, mother.tuning, father.tuning),
         )
 
@@ -73,6 +64,17 @@ def pose_variation(box: Box, config: EvolutionConfig) -> "Variation[Genome]":
         return dataclasses.replace(genome, key_poses=poses, tuning=tuning)
 
     return Variation(create=creation(middle, config), cross=cross, mutate=mutate, box=box)
+
+
+def crossed_poses(
+    key: jax.Array, mother: jax.Array, father: jax.Array, config: EvolutionConfig
+) -> jax.Array:
+    """Cross the parents' key poses [K, J], permuted, aligned, or either at random."""
+    mixes = jax.random.bernoulli(jax.random.fold_in(key, 1), config.permuted)
+    permutes = chosen(config.crossing, "permute") | (chosen(config.crossing, "mixed") & mixes)
+    return jnp.where(
+        permutes, permuted_poses(key, mother, father), aligned_poses(key, mother, father)
+    )
 
 
 def permuted_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.Array:

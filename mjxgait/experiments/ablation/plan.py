@@ -235,11 +235,7 @@ def _settled(config: Config, generations: int) -> Config:
     A run that stopped early would be compared with runs of more generations.
     """
     evolution = dataclasses.replace(
-        config.evolution,
-        target=None,
-        generations=generations,
-        forced=dataclasses.replace(config.evolution.forced, patience=0),
-        ancestors=AncestorsConfig(),
+        config.evolution.unstopped(), generations=generations, ancestors=AncestorsConfig()
     )
     return dataclasses.replace(config, evolution=evolution)
 

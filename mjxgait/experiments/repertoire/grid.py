@@ -153,10 +153,8 @@ def settings_of(cell: Cell, grid: Grid, creature: Creature, base: Config) -> Con
     if grid.turns:
         turning = with_targets(base, creature, WalkTargets(speed=speed, turn=grid.turns[-1]))
         config = dataclasses.replace(config, controller=turning.controller)
-    forced = dataclasses.replace(config.evolution.forced, patience=0)
     # The rows of a program advance together: none may stop early.
-    evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
-    return dataclasses.replace(config, evolution=evolution)
+    return dataclasses.replace(config, evolution=config.evolution.unstopped())
 
 
 def mirror_image(state: Packed, creature: Creature) -> Packed:
