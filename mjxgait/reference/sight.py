@@ -158,7 +158,8 @@ class Grown:
 
     middle: [T, 3] m, centre of mass. momentum: [T, 3] N·s. push: [T, 3] N, total water force.
     low: [T] m, lowest point of all blocks. buried: [T] greatest depth of a block in the ground, as
-    a share of its size. sizes: m by name of the part, cube root of its volume.
+    a share of its size. folded: [T] greatest depth of a block's far end in the block on which it
+    turns, as a share of the smaller size. sizes: m by name of the part, cube root of its volume.
     """
 
     middle: np.ndarray
@@ -166,6 +167,7 @@ class Grown:
     push: np.ndarray
     low: np.ndarray
     buried: np.ndarray
+    folded: np.ndarray
     sizes: Mapping[str, float]
 
     def window(self, frames: slice) -> "Grown":
@@ -189,7 +191,8 @@ def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: flo
     boxes = np.flatnonzero(model.geom_bodyid > 0)
     half, size = model.geom_size[boxes], np.cbrt(8 * model.geom_size[boxes].prod(1))
     middle, momentum, push = (np.full((len(qpos), 3), np.nan) for _ in range(3))
-    low, buried = (np.full(len(qpos), np.nan) for _ in range(2))
+    low, buried, folded = (np.full(len(qpos), np.nan) for _ in range(3))
+    joined = _joined(model, boxes)
     velocity = np.zeros(6)
     for k in np.flatnonzero(np.isfinite(qpos).all(1) & np.isfinite(qvel).all(1)):
         data.qpos[:], data.qvel[:] = qpos[k], qvel[k]
@@ -205,9 +208,41 @@ def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: flo
         reach = (np.abs(data.geom_xmat[boxes, 6:]) * half).sum(1)
         lows = data.geom_xpos[boxes, 2] - reach
         low[k], buried[k] = lows.min(), (-lows / size).max()
+        ends = _far_ends(data, model, boxes)
+        folded[k] = max(
+            (_depth(data, model, ends[i], boxes[j]) / min(size[i], size[j]) for i, j in joined),
+            default=0.0,
+        )
     names = [model.body(model.geom_bodyid[box]).name for box in boxes]
     sizes = dict(zip(names, size.tolist(), strict=True))
-    return Grown(middle, momentum, push, low, np.maximum(buried, 0.0), sizes)
+    buried, folded = np.maximum(buried, 0.0), np.maximum(folded, 0.0)
+    return Grown(middle, momentum, push, low, buried, folded, sizes)
+
+
+def _joined(model: mujoco.MjModel, boxes: np.ndarray) -> list[tuple[int, int]]:
+    """Places in `boxes` of a block and one further in, for pairs with a single joint between."""
+    place = {int(model.geom_bodyid[box]): i for i, box in enumerate(boxes)}
+    found = []
+    for body, i in place.items():
+        joints, above = 0, body
+        while above in place and joints < 2:
+            joints += int(model.body_jntnum[above] > 0)
+            above = int(model.body_parentid[above])
+            if joints == 1 and above in place:
+                found.append((i, place[above]))
+    return found
+
+
+def _far_ends(data: mujoco.MjData, model: mujoco.MjModel, boxes: np.ndarray) -> np.ndarray:
+    """Points [G, 3] m of the blocks that are farthest from their joints, along their middles."""
+    ends: np.ndarray = 2 * data.geom_xpos[boxes] - data.xpos[model.geom_bodyid[boxes]]
+    return ends
+
+
+def _depth(data: mujoco.MjData, model: mujoco.MjModel, point: np.ndarray, box: int) -> float:
+    """Depth in m of a point in a box; negative outside."""
+    inward = (point - data.geom_xpos[box]) @ data.geom_xmat[box].reshape(3, 3)
+    return float((model.geom_size[box] - np.abs(inward)).min())
 
 
 def _push(half: np.ndarray, rotation: np.ndarray, velocity: np.ndarray, drag: float) -> np.ndarray:

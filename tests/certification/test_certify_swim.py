@@ -51,6 +51,7 @@ def swim(speed: Any = SPEED, aside: Any = 0.0, extra: float = 0.0) -> Recording:
             push,
             low=np.zeros(FRAMES),
             buried=np.zeros(FRAMES),
+            folded=np.zeros(FRAMES),
             sizes={"part1": 0.1, "part3": 0.2},
         ),
     )

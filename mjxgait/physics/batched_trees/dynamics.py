@@ -15,6 +15,7 @@ from mjxgait.physics.batched_trees.tree import (
     centres,
     down,
     frames,
+    hinges,
     motions,
     posture,
     root_motion,
@@ -198,10 +199,14 @@ def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
 
     Two blocks are apart if one of their six normals separates them. Blocks that only a line along
     two edges would separate count as overlapping: the depth is never less than the least way out.
+    Of blocks with a single joint between them, only the depth of the outer one's far end in the
+    other counts.
     """
     rot, centre = frames(poses), centres(tree, poses)
     normals = [turn_each(rot, tree.axes[:, k]) for k in range(3)]
     apart = [c[:, None] - c[None] for c in centre]
+    size = sizes(tree)
+    least = jnp.minimum(size[:, None], size[None])
     along = []
     for k, normal in enumerate(normals):
         own = [x[:, None] for x in normal]
@@ -210,9 +215,17 @@ def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
         along.append(tree.half[:, None, k] + other - abs(dot(own, apart)))
     depth = jnp.minimum(jnp.minimum(along[0], along[1]), along[2])
     depth = jnp.minimum(depth, jnp.swapaxes(depth, 0, 1))
-    size = sizes(tree)
-    share = depth / jnp.minimum(size[:, None], size[None])
-    return jnp.max(jnp.where(_counts(tree), share, -FAR), axis=(0, 1))
+    ends = [2 * c - x for c, x in zip(centre, hinges(poses), strict=True)]
+    beyond = [end[:, None] - c[None] for end, c in zip(ends, centre, strict=True)]
+    into = [
+        tree.half[None, :, k] - abs(dot([x[None] for x in normal], beyond))
+        for k, normal in enumerate(normals)
+    ]
+    end = jnp.minimum(jnp.minimum(into[0], into[1]), into[2])
+    joints, both = _joints_between(tree), tree.solid[:, None] * tree.solid[None] > 0
+    within = jnp.where(both & (joints > 1), depth, -FAR)
+    joined = both & (joints == 1) & (tree.above > 0)
+    return jnp.max(jnp.where(joined, end, within) / least, axis=(0, 1))
 
 
 def sizes(tree: Tree) -> jax.Array:
@@ -220,8 +233,8 @@ def sizes(tree: Tree) -> jax.Array:
     return 2 * jnp.cbrt(tree.half[:, 0] * tree.half[:, 1] * tree.half[:, 2])
 
 
-def _counts(tree: Tree) -> jax.Array:
-    """Return the pairs [n, n, L] of blocks with two joints or more between them."""
+def _joints_between(tree: Tree) -> jax.Array:
+    """Return the number of joints between two blocks, [n, n, L]."""
     joint = tree.solid * tree.moves
     between = abs(tree.above[:, None] - tree.above[None])
-    return (jnp.sum(between * joint, axis=2) > 1) & (tree.solid[:, None] * tree.solid[None] > 0)
+    return jnp.sum(between * joint, axis=2)

@@ -176,8 +176,12 @@ def frames(poses: Sequence[Pose]) -> list[jax.Array]:
 
 def centres(tree: Tree, poses: Sequence[Pose]) -> Vector:
     """Centres of all blocks, components [n, L] m from the origin."""
-    place = jnp.stack([pose.pos for pose in poses])
-    return plus(axes(place), turn_each(frames(poses), tree.com))
+    return plus(hinges(poses), turn_each(frames(poses), tree.com))
+
+
+def hinges(poses: Sequence[Pose]) -> Vector:
+    """Places of all links' hinges, components [n, L] m from the origin."""
+    return axes(jnp.stack([pose.pos for pose in poses]))
 
 
 def lows(tree: Tree, poses: Sequence[Pose]) -> jax.Array:

@@ -47,8 +47,10 @@ class ModularCriteria(StaysUp, abc.ABC):
 
     pushed = by_pushes = False
     grown = True
-    revision = 1
-    """Criterion 4 no longer measures the root from the first moment on, nor one leap of jumpers."""
+    revision = 2
+    """1: criterion 4 no longer measures the root from the first moment on, nor one leap of jumpers.
+    2: a far end in the next block counts in criterion 9.
+    """
     verb: str
     """Verb for what a passing body does."""
     promised: str
@@ -227,14 +229,19 @@ def machine(window: Recording, config: CertificateConfig, wanted: BlocksThreshol
 
 
 def apart(window: Recording, config: BlocksThresholds, on_land: bool) -> Criterion:
-    """9. No block is in another that it is not joined to, nor in the ground.
+    """9. No block is in another that it is not joined to, nor in the ground, nor folded through.
 
-    Overlaps count whether they come from growth or from motion.
+    Overlaps count whether they come from growth or from motion. A block may bend into the one that
+    it turns on until its far end meets it.
     """
     sizes = seen(window).sizes
     least = np.array([min(sizes[one], sizes[other]) for one, other in window.overlap_pairs])
     deepest = (window.overlap / least).max(initial=0.0)
-    inside = [at_most("overlap / smaller block's size", deepest, config.overlap)]
+    folded = seen(window).folded.max()
+    inside = [
+        at_most("overlap / smaller block's size", deepest, config.overlap),
+        at_most("far end in the next block / size", folded, config.overlap),
+    ]
     if on_land:
         buried = seen(window).buried.max()
         inside.append(at_most("depth in the ground / block's size", buried, config.overlap))
@@ -295,8 +302,8 @@ class RoamCriteria(GoingCriteria):
     verdict = "it walks"
     verb = "walks"
     axes = 2
-    revision = 2
-    """Criterion 7 was added."""
+    revision = 3
+    """2: criterion 7 was added. 3: as 2 of all modular bodies."""
 
     @override
     def wanted(self, config: CertificateConfig) -> RoamThresholds:
@@ -359,8 +366,8 @@ class JumpCriteria(ModularCriteria):
         return outcome.stayed_up & (middling >= config.jump.height)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """Height in m, a quarter above the threshold."""
-        return 1.25 * config.jump.height
+        """Height in m, a tenth above the threshold."""
+        return 1.1 * config.jump.height
 
 
 def highest(low: np.ndarray, time_step: float) -> np.ndarray:

@@ -21,8 +21,9 @@ class BlocksThresholds:
     Attributes:
       arrive: share of the perturbed starts that must succeed.
       body_speed: m/s, of the fastest block.
-      overlap: largest depth of blocks in others that no joint joins, or in the ground, over the
-        size of the smaller one, the cube root of its volume.
+      overlap: largest depth of blocks in others that no joint joins, of a block's far end in the
+        next one, or of a block in the ground, over the size of the smaller one, the cube root of
+        its volume.
       again: largest relative change from the result of evolution.
     """
 
