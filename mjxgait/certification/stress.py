@@ -151,7 +151,7 @@ def _trials(
         yield f"slope of {config.slope:g}° {way}", walked(dataclasses.replace(plain, slope=slope))
     even = dataclasses.replace(plain, friction=np.ones(len(plain)))
     yield f"friction {config.friction:g}", walked(even, slippery(creature, config.friction))
-    speed = config.push * float(np.sqrt(9.81 * creature.frame.hip_height))
+    speed = config.push * creature.unit_speed
     window = CertificateConfig().pushes.window
     pushed = pushed_starts(creature, config.starts, rng(1), speed, window)
     yield f"push of {config.push:g} √(g·h)", walked(pushed)

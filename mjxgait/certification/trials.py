@@ -72,7 +72,7 @@ def starts(creature: Creature, config: CertificateConfig, draw: Draw, count: int
 
 def pushes(creature: Creature, config: CertificateConfig, draw: Draw, count: int) -> Starts:
     """Draw the pushes of criterion 5."""
-    speed = config.pushes.speed * _unit_speed(creature)
+    speed = config.pushes.speed * creature.unit_speed
     return pushed_starts(creature, count, draw.generator(1), speed, config.pushes.window)
 
 
@@ -84,17 +84,13 @@ def ladder(creature: Creature, config: CertificateConfig, draw: Draw) -> list[St
     settings, rng = config.pushes, draw.generator(2)
     begin, end = settings.window[0], min(settings.window[0] + 2.0, settings.window[1])
     watched = np.full(settings.ladder_count, end + settings.ladder_seconds)
-    speeds = [size * _unit_speed(creature) for size in settings.ladder]
+    speeds = [size * creature.unit_speed for size in settings.ladder]
     return [
         dataclasses.replace(
             pushed_starts(creature, settings.ladder_count, rng, speed, (begin, end)), end=watched
         )
         for speed in speeds
     ]
-
-
-def _unit_speed(creature: Creature) -> float:
-    return float(np.sqrt(creature.gravity * creature.frame.hip_height))
 
 
 def simulate(

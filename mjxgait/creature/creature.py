@@ -67,6 +67,11 @@ class Creature:
         return float(-self.model.opt.gravity[2])
 
     @property
+    def unit_speed(self) -> float:
+        """Unit of pushes and of speeds of body parts: √(g · hip height), m/s."""
+        return float(np.sqrt(self.gravity * self.frame.hip_height))
+
+    @property
     def digest(self) -> str:
         """Hash of the files that define the body; the README does not count."""
         text = "\0".join(f"{name}\0{self.files[name]}" for name in sorted(self.files))

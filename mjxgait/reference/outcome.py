@@ -57,6 +57,11 @@ class Trajectory:
     target: np.ndarray
     phase: np.ndarray
 
+    def taken(self, frames: slice | np.ndarray) -> "Trajectory":
+        """Return some of the frames."""
+        arrays = (self.qpos, self.qvel, self.torque, self.target, self.phase)
+        return Trajectory(self.time_step, *(array[:, frames] for array in arrays))
+
 
 def blank_film(creature: Creature, time_step: float, rows: int, steps: int) -> Trajectory:
     """Return an empty recording, filled with NaN."""

@@ -136,9 +136,4 @@ class Sheet:
 def _beginning(walk: Walk, seconds: float) -> Walk:
     """The first seconds of a walk."""
     count = max(round(seconds / walk.time_step), 2)
-    film = walk.trajectory
-    kept = {
-        name: getattr(film, name)[:, :count]
-        for name in ("qpos", "qvel", "torque", "target", "phase")
-    }
-    return dataclasses.replace(walk, trajectory=dataclasses.replace(film, **kept))
+    return dataclasses.replace(walk, trajectory=walk.trajectory.taken(slice(count)))

@@ -260,11 +260,7 @@ def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     last = min(last, round((fell + AFTERMATH) / film.time_step)) if np.isfinite(fell) else last
     # A walk that diverges at once is shown standing.
     frames = np.minimum(np.arange(max(last, 2)), max(last, 1) - 1)
-    kept = {
-        name: getattr(film, name)[:, frames]
-        for name in ("qpos", "qvel", "torque", "target", "phase")
-    }
-    return Walk(creature, champion, dataclasses.replace(film, **kept), fell, start)
+    return Walk(creature, champion, film.taken(frames), fell, start)
 
 
 def poses_of(

@@ -100,7 +100,7 @@ def _spread(creature: Creature, config: RolloutConfig) -> _Spread:
         angle=config.joint_noise,
         rate=config.velocity_noise,
         friction=config.friction,
-        speed=config.push * float(np.sqrt(creature.gravity * creature.frame.hip_height)),
+        speed=config.push * creature.unit_speed,
         moment=(steps // 4, max(3 * steps // 4, steps // 4 + 1)),
     )
 

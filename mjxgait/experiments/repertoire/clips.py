@@ -147,7 +147,7 @@ def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
     )
     film = outcome.trajectory
     root = creature.root_dof
-    fastest = STILL * np.sqrt(creature.gravity * creature.frame.hip_height)
+    fastest = STILL * creature.unit_speed
     motions = []
     for row, up in enumerate(outcome.stayed_up):
         moves = np.linalg.norm(film.qvel[row, :, root : root + 3], axis=1) >= fastest
