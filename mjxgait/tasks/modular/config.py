@@ -97,7 +97,7 @@ class JumpWeights:
     """Weight of each term; all but `height` are penalties.
 
     Attributes:
-      height: m, of the lowest part at the best moment, mean of the halves of the time that counts.
+      height: m, of the lowest part at the best moment, mean of the spans of the time that counts.
       overlap: part of it lost by blocks in each other or in the ground.
       wild: part of the rest lost by an episode that ends early: the share of the time that is
         missing.

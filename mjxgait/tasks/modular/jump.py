@@ -18,19 +18,23 @@ from mjxgait.tasks.modular.base import (
 from mjxgait.tasks.modular.config import JumpConfig, JumpWeights
 from mjxgait.types import Sensed, pytree
 
-SPANS = 2
-"""Spans of the time that counts; the body must jump in each.
+SPAN = 2.0
+"""Length in s of the spans of the time that counts; the body must jump in each.
 
 Once in eight seconds some individual leaves the ground by chance, as high as real jumpers, and only
 in the trial that it was selected by.
 """
+LEAST = 0.01
+"""m, height of a leap; without one in a span the episode ends: bodies that lie still stay so."""
+LYING = 2
+"""Reason for that end."""
 
 
 @pytree
 class JumpStats(EpisodeStats):
     """Extension of `EpisodeStats`.
 
-    heights: [SPANS] m, greatest height of the lowest part in each.
+    heights: [P] m, greatest height of the lowest part in each of P spans.
     """
 
     heights: jax.Array
@@ -43,21 +47,29 @@ class Jump(ModularTask):
     terms = tuple(field.name for field in dataclasses.fields(JumpWeights))
     outcomes = ("height", "seconds")
 
+    @property
+    def spans(self) -> int:
+        """Number of spans, P, without about one for settling."""
+        return max(round(self.horizon * self.step / SPAN) - 1, 2)
+
     @override
     def init(self) -> JumpStats:
         none = jnp.zeros((), jnp.int32)
-        return JumpStats(none, none, jnp.zeros(()), jnp.zeros(SPANS))
+        return JumpStats(none, none, jnp.zeros(()), jnp.zeros(self.spans))
 
     @override
     def update(
         self, stats: JumpStats, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: object
     ) -> JumpStats:
         begins, low = stats.steps <= params, jnp.min(sensed.geom_low)
-        span = SPANS * (stats.steps - params) // jnp.maximum(self.horizon - params, 1)
-        now = (jnp.arange(SPANS) == span) & ~begins
+        span = self.spans * (stats.steps - params) // jnp.maximum(self.horizon - params, 1)
+        number = jnp.arange(self.spans)
+        now = (number == span) & ~begins
+        lies = jnp.any((number < span) & (stats.heights < LEAST)) & ~begins
         return dataclasses.replace(
             stats,
             steps=stats.steps + 1,
+            reason=jnp.where(lies, LYING, stats.reason),
             overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, own(sensed).depth)),
             heights=jnp.where(now, jnp.maximum(stats.heights, low), stats.heights),
         )
@@ -65,8 +77,8 @@ class Jump(ModularTask):
     def evaluate(self, stats: JumpStats, settings: JumpConfig) -> Mapping[str, jax.Array]:
         """Height in m; its loss by overlap; the loss of the rest by an early end.
 
-        Blocks overlap each other or the ground. An early end costs, because the wildest leap is the
-        last.
+        Blocks overlap each other or the ground. An early end costs: the wildest leap is the last, and
+        a body that lies still does not jump again.
         """
         height = jnp.mean(stats.heights)
         inside = lost((stats.overlap / settings.overlap) ** SHARPNESS)

@@ -26,9 +26,10 @@ from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.sight import seen_grown
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.reference.stepping import Stepping
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.modular.config import JumpConfig, RoamConfig
 from mjxgait.tasks.modular.follow import Following, FollowInWater, FollowOnLand
-from mjxgait.tasks.modular.jump import SPANS, Jump
+from mjxgait.tasks.modular.jump import LYING, Jump
 from mjxgait.tasks.modular.roam import Roam
 from mjxgait.training.experiment import Experiment, build_experiment
 
@@ -249,9 +250,24 @@ def test_jump_height_is_of_the_lowest_part_after_settling(task: Roam):
     deep = jumped(10 * settings.overlap)
     assert deep["overlap"] < deep["height"]
     half = dataclasses.replace(
-        jumping.init(), heights=jnp.full(SPANS, 0.3), steps=jnp.int32(task.horizon // 2)
+        jumping.init(), heights=jnp.full(jumping.spans, 0.3), steps=jnp.int32(task.horizon // 2)
     )
     assert float(jumping.evaluate(half, settings)["wild"]) == pytest.approx(0.15)
+
+
+def test_a_body_that_lies_still_for_a_span_ends_its_episode(task: Roam):
+    jumping, settings, ends = Jump(task.creature, 0.1, 100, task.ends), JumpConfig(settle=2.0), []
+    params, update = jumping.params(settings), jax.jit(jumping.update)
+    assert jumping.spans == 4
+    for until in (40, 70, 100):
+        stats = jumping.init()
+        while int(stats.steps) < 100 and not int(stats.reason):
+            k = int(stats.steps)
+            low = jnp.float32(0.02 if k % 15 == 10 and k < until else 0.005)
+            sensed = moment({"depth": jnp.float32(-1.0)}, geom_low=CALM.geom_low.at[:].set(low))
+            stats = update(stats, sensed, jnp.zeros(3), params, ())
+        ends.append((int(stats.steps), int(stats.reason)))
+    assert ends == [(61, LYING), (81, LYING), (100, Reason.FINISHED)]
 
 
 def test_sinking_into_the_ground_costs_speed(task: Roam):
