@@ -19,7 +19,7 @@ from mjxgait.environments.problem import NO_OVERLAP, Problem, Progress
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.reference.bodies import VELOCITY_STAGE, Bodies
-from mjxgait.reference.sight import PartOverlap
+from mjxgait.reference.overlap import PartOverlap
 from mjxgait.reference.starts import Starts as ReferenceStarts
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.reference.state import Drive

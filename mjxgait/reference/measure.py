@@ -10,9 +10,11 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
+from mjxgait.reference.grown import Grown, seen_grown
 from mjxgait.reference.layout import foot_middles, level_nose, start_frame
 from mjxgait.reference.outcome import Trajectory
-from mjxgait.reference.sight import Grown, Sight, overlaps, seen_grown
+from mjxgait.reference.overlap import overlaps
+from mjxgait.reference.sight import Sight
 from mjxgait.reference.starts import Starts
 from mjxgait.reference.terrain import terrain_of
 

@@ -19,7 +19,7 @@ from mjxgait.config.tables import build
 from mjxgait.creature import load_creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.errors import UserError
-from mjxgait.reference.sight import colliding_with_itself, neighbours, overlaps
+from mjxgait.reference.overlap import colliding_with_itself, neighbours, overlaps
 
 SHORT = build(CertificateConfig, {"seconds": 2.0, "warmup": 0.5}, "test")
 

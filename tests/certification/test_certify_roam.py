@@ -13,9 +13,9 @@ from mjxgait.api import load_creature
 from mjxgait.certification import CertificateConfig, outdated
 from mjxgait.certification.certificate import schema_of
 from mjxgait.creature.geometry import lowest
+from mjxgait.reference.grown import Grown, seen_grown
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
-from mjxgait.reference.sight import Grown, seen_grown
 from mjxgait.tasks.modular.criteria import JumpCriteria, RoamCriteria
 
 CONFIG, DEMANDS = CertificateConfig(), RoamCriteria()

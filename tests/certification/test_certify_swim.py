@@ -12,9 +12,9 @@ from mjxgait.api import load_creature
 from mjxgait.certification import CertificateConfig
 from mjxgait.certification.acceptance import Commands
 from mjxgait.reference.bodies import Water
+from mjxgait.reference.grown import Grown, seen_grown
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
-from mjxgait.reference.sight import Grown, seen_grown
 from mjxgait.tasks.modular.criteria import SwimCriteria
 from mjxgait.tasks.modular.follow_criteria import FollowCriteria
 

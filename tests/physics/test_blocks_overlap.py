@@ -12,7 +12,8 @@ from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature.scale import load_files
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Surroundings
-from mjxgait.reference.sight import overlaps, seen_grown
+from mjxgait.reference.grown import seen_grown
+from mjxgait.reference.overlap import overlaps
 from mjxgait.types import BodyState
 
 

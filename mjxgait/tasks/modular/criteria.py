@@ -24,9 +24,9 @@ from mjxgait.certification.describe import vibration, worst_overlap
 from mjxgait.champion import Champion
 from mjxgait.controllers.sims_brain.reference_body import DRAG
 from mjxgait.creature import Creature
+from mjxgait.reference.grown import Grown
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Fall, Outcome
-from mjxgait.reference.sight import Grown
 from mjxgait.reference.starts import Starts
 from mjxgait.tasks.modular.thresholds import (
     BlocksThresholds,

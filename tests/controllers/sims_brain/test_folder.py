@@ -9,7 +9,7 @@ from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.reference.sight import overlaps
+from mjxgait.reference.overlap import overlaps
 
 COUNT = 60
 

@@ -22,8 +22,8 @@ from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.plugins.registry import build_config
 from mjxgait.reference.bodies import VELOCITY_STAGE
+from mjxgait.reference.grown import seen_grown
 from mjxgait.reference.outcome import Outcome
-from mjxgait.reference.sight import seen_grown
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.reference.stepping import Stepping
 from mjxgait.tasks.falls import Reason

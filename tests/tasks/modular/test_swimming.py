@@ -17,7 +17,7 @@ from mjxgait.controllers.sims_brain.reference_body import DRAG, grow
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.plugins.registry import build_config
-from mjxgait.reference.sight import seen_grown
+from mjxgait.reference.grown import seen_grown
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.curves import figure
 from mjxgait.rendering.genomes import bodies_of, draw_bodies, draw_graph
