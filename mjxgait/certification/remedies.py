@@ -165,6 +165,11 @@ DISTURBED = (
         "Ask for slower turns (--steer), or train longer (--generations).",
     ),
     Entry(
+        "share that follows",
+        "It does not follow {rest:.0%} of the lights that move; {spare:.0%} may be missed.",
+        criterion="a light that moves",
+    ),
+    Entry(
         "share that *",
         "It does not succeed from {rest:.0%} of the perturbed starts; {spare:.0%} may fail.",
         MORE_STARTS,
@@ -328,6 +333,11 @@ OTHER_TASKS = (
     Entry(
         "from the start / hip height",
         "It moves {v:.1f} hip heights away from its place; {t:.2g} is allowed.",
+    ),
+    Entry(
+        "far end in the next block / size",
+        "A block folds {v:.0%} of its size deep through the next one; {t:.0%} is allowed.",
+        "Make overlap dearer: a lower --fitness.overlap.",
     ),
     Entry(
         "* block's size",

@@ -56,7 +56,14 @@ def made_up(name: str, criterion: str = "x", value: float = 0.4) -> tuple[Criter
     return Criterion(1, criterion, (measure,)), measure
 
 
-CRITERIA = ("x", "perturbed starts", "pushes", "half the time step", "as in evolution")
+CRITERIA = (
+    "x",
+    "perturbed starts",
+    "pushes",
+    "half the time step",
+    "as in evolution",
+    "a light that moves",
+)
 
 
 def entries_on(name: str) -> list:
