@@ -96,7 +96,7 @@ def several(runs: int) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class AncestorsConfig:
-    """Runs of an easier task before this one; their best individuals begin it (two-step evolution).
+    """Small runs of an easier task, or the same, before this one; their best individuals begin it.
 
     They stay in the run's folder `ancestors`. `train --from` takes their place. Source: Shim, Shin
     and Kim (2004).
@@ -169,7 +169,7 @@ class EvolutionConfig:
         first generation: keeps one family from taking over.
       forced: a phase of rapid mutation and immigrants when growth stalls.
       restart: a new first population in place of one that has learnt nothing.
-      ancestors: runs of an easier task before this one; not for islands and studies.
+      ancestors: small runs before this one; not for islands and studies.
       islands: several such populations that exchange their best (docs/guide/cluster.md).
     """
 

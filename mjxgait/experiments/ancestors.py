@@ -1,4 +1,4 @@
-"""Runs of an easier task that come before a run: the best of each begin it (two-step evolution)."""
+"""Small runs that come before a run: the best of each begin it (two-step evolution)."""
 
 import dataclasses
 import shutil
