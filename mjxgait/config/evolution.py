@@ -106,6 +106,8 @@ class AncestorsConfig:
       task: what they evolve for, with the creature's settings for it.
       population: P of each.
       generations: number of generations of each.
+      initial_choice: genomes drawn and evaluated for each place of their first generation; 0: as
+        many as for that task.
     """
 
     __pydantic_config__ = STRICT
@@ -113,6 +115,7 @@ class AncestorsConfig:
     task: Annotated[str, HOST] = "swim"
     population: Annotated[Count, HOST] = 60
     generations: Annotated[Count, HOST] = 40
+    initial_choice: Annotated[Whole, HOST, ADDED] = 0
 
 
 @dataclasses.dataclass(frozen=True)

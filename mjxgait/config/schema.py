@@ -64,6 +64,8 @@ class RolloutConfig:
       variety: multiple of the perturbed starts to draw in all; each generation takes the next ones.
         Above 1 every individual must be evaluated anew: `evolution.elite`.
       hold: generations that have the same perturbed starts, before the next ones come.
+      moves: s; time at which the lights of the perturbed starts change places, for tasks that follow
+        one; 0 for never.
       joint_noise: rad; half width of the uniform perturbation of each joint at a perturbed start.
       velocity_noise: rad/s; the same for the speeds of the joints.
       friction: range of the factor on the floor's friction.
@@ -101,6 +103,7 @@ class RolloutConfig:
     step: Annotated[NonNegative, SHAPE] = 0.0
     variety: Annotated[Count, SHAPE] = 1
     hold: Annotated[Count, ADDED] = 1
+    moves: Annotated[NonNegative, ADDED] = 0.0
     joint_noise: NonNegative = 0.1
     velocity_noise: NonNegative = 0.3
     friction: tuple[Positive, Positive] = (0.8, 1.2)

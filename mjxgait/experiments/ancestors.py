@@ -104,6 +104,7 @@ def settings_of_ancestors(creature: Creature, config: Config) -> Config:
         own.evolution,
         population=ancestors.population,
         generations=ancestors.generations,
+        initial_choice=ancestors.initial_choice or own.evolution.initial_choice,
         body=config.evolution.body,
         ancestors=AncestorsConfig(),
     )

@@ -222,6 +222,19 @@ def test_followers_come_from_runs_without_a_light():
         assert own.controller.strength == (1.0, 1.0), "of the easier task"
 
 
+@pytest.mark.parametrize("choice, drawn", [(0, 8), (3, 3)])
+def test_ancestors_choose_among_random_bodies(choice: int, drawn: int):
+    """0 is the choice of their task. The run itself chooses none."""
+    blocks = load_creature("blocks")
+    settings = resolve_config(
+        blocks.settings.train | {"evolution": {"ancestors": {"initial_choice": choice}}},
+        "blocks",
+        use={"task": "follow"},
+    )
+    assert settings.evolution.initial_choice == 1
+    assert settings_of_ancestors(blocks, settings).evolution.initial_choice == drawn
+
+
 def test_islands_and_studies_begin_as_drawn(capsys, tmp_path: Path):
     follow = ("train", "--env", "blocks", "--task", "follow", "--out", tmp_path / "run")
     said = said_by(capsys, *follow, "--evolution.islands.count", 2, code=2)

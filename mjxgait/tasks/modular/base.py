@@ -50,12 +50,14 @@ class LocomotionStats(EpisodeStats):
     """Extension of `EpisodeStats`.
 
     settled, place: [3] m, centre of mass when counting began, and now.
-    light: [3] m, its place. since: [] step from which the way counts. None without a light.
+    light: [3] m, its place. gained: [] m, way towards its former place. since: [] step from which
+    the way counts. None without a light.
     """
 
     settled: jax.Array
     place: jax.Array
     light: jax.Array | None
+    gained: jax.Array | None
     since: jax.Array | None
 
 
@@ -130,6 +132,7 @@ class LocomotionTask(ModularTask):
             "settled": nowhere,
             "place": nowhere,
             "light": None if self.dark is None else jnp.asarray(self.dark),
+            "gained": None if self.dark is None else jnp.zeros(()),
             "since": None if self.dark is None else none,
         }
 

@@ -1,7 +1,7 @@
 """Follow task for modular bodies: get nearer to a light, wherever it is.
 
-Each trial has its own light, too far away to be reached. The brain observes its direction in the
-axes of each block.
+Each trial has its own light, too far away to be reached, which may move to another side once. The
+brain observes its direction in the axes of each block.
 """
 
 import dataclasses
@@ -19,14 +19,27 @@ from mjxgait.creature import Creature
 from mjxgait.tasks.modular.base import LocomotionTask, length, own
 from mjxgait.tasks.modular.roam import Roam
 from mjxgait.tasks.modular.swim import Swim
-from mjxgait.tasks.starts import Starts
-from mjxgait.types import Sensed
+from mjxgait.tasks.starts import NEVER, Starts
+from mjxgait.types import Sensed, pytree
+
+
+@pytree
+class Light:
+    """Light of a trial.
+
+    place: [3] m; as a trial's goal, from where the root starts. later: [3] m, its place after it
+    moved. steps: [] until it moves.
+    """
+
+    place: jax.Array
+    later: jax.Array
+    steps: jax.Array
 
 
 class Following(LocomotionTask):
     """Implementation of `Task`: base class for following in water and on land.
 
-    The way is the decrease of the distance to the light.
+    The way is the decrease of the distance to the light, wherever it was.
     """
 
     adds: ClassVar[tuple[str, ...]] = ("light",)
@@ -37,40 +50,57 @@ class Following(LocomotionTask):
         """The first light is ahead, and in each round the others are elsewhere.
 
         The lights of a round cancel out with the one ahead: moving straight on gains as much on
-        some as it loses on the others.
+        some as it loses on the others. With `moves` the others change places, so they still do.
         """
         rounds = settings.variety
         others = (settings.starts - 1) // rounds
         keys = jax.random.split(jax.random.fold_in(key, 6), rounds)
         drawn = jax.vmap(lambda key: balanced(key, others, self.axes))(keys)
-        lights = LIGHT * jnp.vstack([jnp.array([[1.0, 0.0, 0.0]]), drawn.reshape(-1, 3)])
-        return dataclasses.replace(super().trials(key, creature, settings), goal=lights)
+        moves = round(settings.moves / self.step) if settings.moves else NEVER
+        goal = Light(
+            place=_lights(drawn),
+            later=_lights(jnp.roll(drawn, 1, axis=1)),
+            steps=jnp.full(settings.starts, moves, jnp.int32).at[0].set(NEVER),
+        )
+        return dataclasses.replace(super().trials(key, creature, settings), goal=goal)
 
-    def goal(self, trial: Starts) -> jax.Array:
-        """Place [3] of the light in m; the trial has it from where the root starts."""
-        return jnp.asarray(trial.qpos[:3] + trial.goal)
+    def goal(self, trial: Starts) -> Light:
+        """The light at its places in the world."""
+        start, light = trial.qpos[:3], trial.goal
+        return Light(start + light.place, start + light.later, jnp.asarray(light.steps))
 
-    def observations(self, goal: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
+    @override
+    def next_goal(self, goal: Light, sensed: Sensed) -> Light:
+        place = jnp.where(goal.steps == 1, goal.later, goal.place)
+        return dataclasses.replace(goal, place=place, steps=goal.steps - 1)
+
+    def observations(self, goal: Light, sensed: Sensed) -> Mapping[str, jax.Array]:
         """Direction [G, 3] of the light in the axes of each block."""
         axes = own(sensed).geom_rot
         assert axes is not None
-        there = goal - sensed.geom_pos
+        there = goal.place - sensed.geom_pos
         there = there / jnp.sqrt(jnp.sum(there**2, axis=1, keepdims=True))
         return {"light": jnp.sum(axes * there[:, None], axis=2)}
 
     @override
     def update(
-        self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: jax.Array
+        self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Light
     ) -> Any:
-        after = super().update(stats, sensed, torque, params, goal)
-        return dataclasses.replace(after, light=goal, since=params)
+        """A move of the light ends the way towards its old place; the next begins there and then."""
+        moved = jnp.any(stats.light != goal.place) & (stats.steps > params)
+        gained = jnp.where(moved, self.way(stats), stats.gained)
+        settled = jnp.where(moved, stats.place, stats.settled)
+        after = super().update(
+            dataclasses.replace(stats, settled=settled), sensed, torque, params, goal
+        )
+        return dataclasses.replace(after, light=goal.place, gained=gained, since=params)
 
     @override
     def way(self, stats: Any) -> jax.Array:
         before, now = (
             length((stats.light - place)[: self.axes]) for place in (stats.settled, stats.place)
         )
-        return before - now
+        return stats.gained + (before - now)
 
     def outcome(self, stats: Any) -> Mapping[str, jax.Array]:
         """Also the time in s from which the way counted."""
@@ -83,6 +113,11 @@ class FollowInWater(Following, Swim):
 
 class FollowOnLand(Following, Roam):
     """Implementation of `Task`."""
+
+
+def _lights(others: jax.Array) -> jax.Array:
+    """Places [R, 3] m of the one ahead and of the others [rounds, others, 3]."""
+    return LIGHT * jnp.vstack([jnp.array([[1.0, 0.0, 0.0]]), others.reshape(-1, 3)])
 
 
 def balanced(key: jax.Array, count: int, axes: int) -> jax.Array:

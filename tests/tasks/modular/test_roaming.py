@@ -28,9 +28,10 @@ from mjxgait.reference.starts import nominal_starts
 from mjxgait.reference.stepping import Stepping
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.modular.config import JumpConfig, RoamConfig
-from mjxgait.tasks.modular.follow import Following, FollowInWater, FollowOnLand
+from mjxgait.tasks.modular.follow import Following, FollowInWater, FollowOnLand, Light
 from mjxgait.tasks.modular.jump import LYING, Jump
 from mjxgait.tasks.modular.roam import Roam
+from mjxgait.tasks.starts import NEVER
 from mjxgait.training.experiment import Experiment, build_experiment
 
 TABLE = {
@@ -94,6 +95,32 @@ def test_the_reference_simulator_finds_the_same_approach(experiment: Experiment,
     # A corner that touches one tick earlier changes the path.
     assert np.median(np.abs(mine - lengths) / lengths) < 0.05
     assert (np.abs(lengths - elsewhere) > 0.02).any(), "some go by the light"
+
+
+def test_both_simulators_move_the_light_at_the_same_time():
+    """In the second of two equal starts in water the light ahead jumps to the side after 0.5 s."""
+    table = TABLE | {"use": {"controller": "brain", "task": "follow"}, "fitness": {"settle": 0.1}}
+    swimmers = build_experiment(load_creature("blocks"), build_config(table, "test"))
+    state, step = swimmers.init(), swimmers.simulator.task.step
+    starts = jax.tree.map(lambda leaf: np.asarray(leaf)[[0, 0]], swimmers.starts)
+    later = np.tile(np.float32([0.0, 10.0, 0.0]), (2, 1))
+    lights = Light(starts.goal.place, later, np.array([NEVER, round(0.5 / step)], np.int32))
+    starts = dataclasses.replace(starts, goal=lights)
+    place = np.asarray(jax.jit(swimmers.simulate)(state.genomes, starts).stats.place)
+    elsewhere = place[:, 1] - place[:, 0]
+    size = np.linalg.norm(elsewhere, axis=1)
+    for rank in np.argsort(-size)[:3]:
+        champion = swimmers.champion(state, {}, int(rank))
+        body = champion.embodied(swimmers.creature)
+        start = dataclasses.replace(
+            nominal_starts(body, 2),
+            light=np.tile([10.0, 0, 0], (2, 1)),
+            moved_light=later,
+            light_time=np.array([np.inf, 0.5]),
+        )
+        middle = simulate(body, champion, start, 1.6, record=2).middle[:, -2]
+        assert size[rank] > 0.01, "the light matters"
+        assert np.linalg.norm(middle[1] - middle[0] - elsewhere[rank]) < 0.05 * size[rank]
 
 
 def test_reference_light_direction_is_in_each_blocks_own_axes(experiment: Experiment, first):
@@ -278,6 +305,11 @@ def test_sinking_into_the_ground_costs_speed(task: Roam):
     assert both["overlap"] + both["balance"] < both["speed"]
 
 
+def lamp(place: list[float], later: tuple[float, ...] = (0.0,) * 3, steps: int = NEVER) -> Light:
+    """A light that moves after so many steps."""
+    return Light(jnp.array(place), jnp.array(later), jnp.array(steps))
+
+
 @pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
 def test_following_counts_the_approach_to_the_light(task: Roam, follower: type):
     """The body moves 2 m of the 10 m; a step aside gains nothing."""
@@ -287,12 +319,44 @@ def test_following_counts_the_approach_to_the_light(task: Roam, follower: type):
         stats, params = following.init(), following.params(settings)
         for k in (0, 1):
             sensed = moment({"com": jnp.array([2.0 * k, 0.0, 0.0])})
-            stats = following.update(stats, sensed, jnp.zeros(3), params, jnp.array(light))
+            stats = following.update(stats, sensed, jnp.zeros(3), params, lamp(light))
         assert float(following.way(stats)) == pytest.approx(way, abs=1e-3)
         evaluation = following.evaluate(
             dataclasses.replace(stats, overlap=jnp.float32(1.0)), settings
         )
         assert (evaluation["overlap"] > 0) == (way > 0), "nothing is gained by blocks in each other"
+
+
+def test_the_way_to_a_light_that_moves_is_the_sum_of_both(task: Roam):
+    """One step of 2 m towards the first light, then three of 1 m away from it, to the second."""
+    following = FollowInWater(task.creature, task.step, task.horizon, task.ends)
+    settings = following.Settings(settle=task.step)
+    stats, params = following.init(), following.params(settings)
+    light, seen = lamp([10.0, 0, 0], (-10.0, 0, 0), 3), []
+    for place in (-5.0, 0.0, 2.0, 1.0, 0.0, -1.0):
+        sensed = moment({"com": jnp.array([place, 0.0, 0.0])})
+        stats = following.update(stats, sensed, jnp.zeros(3), params, light)
+        light = following.next_goal(light, sensed)
+        seen.append(float(following.way(stats)))
+    assert seen == pytest.approx([0.0, 0.0, 2.0, 3.0, 4.0, 5.0], abs=1e-5)
+
+
+@pytest.mark.parametrize("others, moved", [(1, False), (2, True), (3, True)])
+def test_lights_change_places_in_all_trials_but_the_first(task: Roam, others: int, moved: bool):
+    following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
+    creature, rounds = load_creature("blocks"), 20
+    rollout = RolloutConfig(starts=1 + others * rounds, variety=rounds)
+    still = following.trials(key_of(0), creature, rollout).goal
+    assert (np.asarray(still.steps) == NEVER).all()
+    lights = following.trials(key_of(0), creature, dataclasses.replace(rollout, moves=0.5)).goal
+    np.testing.assert_array_equal(lights.place, still.place)
+    assert lights.steps[0] == NEVER
+    assert (np.asarray(lights.steps[1:]) == round(0.5 / task.step)).all()
+    before, after = (
+        np.asarray(all_[1:]).reshape(rounds, others, 3) for all_ in (lights.place, lights.later)
+    )
+    np.testing.assert_allclose(before.sum(1), after.sum(1), atol=1e-5)
+    assert (np.abs(before - after).max(2) > 0.1).all() == moved
 
 
 @pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
@@ -304,7 +368,7 @@ def test_lights_cancel_out_and_change_every_round(task: Roam, follower: type, ot
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rounds = 200
     rollout = RolloutConfig(starts=1 + others * rounds, variety=rounds)
-    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
     np.testing.assert_allclose(np.linalg.norm(lights, axis=1), 1.0, rtol=1e-5)
     assert lights[0] == pytest.approx([1, 0, 0])
     drawn = lights[1:].reshape(rounds, others, 3)
@@ -321,7 +385,7 @@ def test_lights_cancel_out_and_change_every_round(task: Roam, follower: type, ot
 def test_many_lights_cover_all_directions(task: Roam, follower: type):
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=200)
-    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
     spread = (lights**2).mean(0)
     np.testing.assert_allclose(spread[: following.axes], 1 / following.axes, atol=0.1)
 
@@ -329,7 +393,7 @@ def test_many_lights_cover_all_directions(task: Roam, follower: type):
 def test_lights_in_water_form_tetrahedra_and_crosses(task: Roam):
     following = FollowInWater(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=1 + 3 * 100, variety=100)
-    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal) / LIGHT
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
     cosines = [np.sort(np.r_[1, one[:, 0]]) for one in lights[1:].reshape(100, 3, 3)]
     solid, cross = ([-1 / 3] * 3 + [1], [-1, 0, 0, 1])
     solids = sum(bool(np.allclose(found, solid, atol=1e-5)) for found in cosines)
@@ -351,7 +415,7 @@ def test_a_promised_speed_counts_from_the_settling_time(task: Roam):
     following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
     settings, still = following.Settings(settle=0.5), jnp.zeros(3)
     params = following.params(settings)
-    stats = following.update(following.init(), CALM, still, params, jnp.ones(3))
+    stats = following.update(following.init(), CALM, still, params, lamp([1.0] * 3))
     assert float(following.outcome(stats)["since"]) == pytest.approx(0.5, abs=task.step)
     acceptance, config = acceptance_of("follow-on-land"), CertificateConfig()
     for told, since in (({"since": 4.0}, 4.0), ({}, config.warmup)):
