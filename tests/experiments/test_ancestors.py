@@ -222,7 +222,7 @@ def test_followers_come_from_runs_without_a_light():
         assert own.controller.strength == (1.0, 1.0), "of the easier task"
 
 
-@pytest.mark.parametrize("choice, drawn", [(0, 8), (3, 3)])
+@pytest.mark.parametrize(("choice", "drawn"), [(0, 8), (3, 3)])
 def test_ancestors_choose_among_random_bodies(choice: int, drawn: int):
     """0 is the choice of their task. The run itself chooses none."""
     blocks = load_creature("blocks")

@@ -341,7 +341,7 @@ def test_the_way_to_a_light_that_moves_is_the_sum_of_both(task: Roam):
     assert seen == pytest.approx([0.0, 0.0, 2.0, 3.0, 4.0, 5.0], abs=1e-5)
 
 
-@pytest.mark.parametrize("others, moved", [(1, False), (2, True), (3, True)])
+@pytest.mark.parametrize(("others", "moved"), [(1, False), (2, True), (3, True)])
 def test_lights_change_places_in_all_trials_but_the_first(task: Roam, others: int, moved: bool):
     following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
     creature, rounds = load_creature("blocks"), 20
