@@ -368,7 +368,9 @@ def test_lights_cancel_out_and_change_every_round(task: Roam, follower: type, ot
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rounds = 200
     rollout = RolloutConfig(starts=1 + others * rounds, variety=rounds)
-    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
+    lights = (
+        np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
+    )
     np.testing.assert_allclose(np.linalg.norm(lights, axis=1), 1.0, rtol=1e-5)
     assert lights[0] == pytest.approx([1, 0, 0])
     drawn = lights[1:].reshape(rounds, others, 3)
@@ -385,7 +387,9 @@ def test_lights_cancel_out_and_change_every_round(task: Roam, follower: type, ot
 def test_many_lights_cover_all_directions(task: Roam, follower: type):
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=200)
-    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
+    lights = (
+        np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
+    )
     spread = (lights**2).mean(0)
     np.testing.assert_allclose(spread[: following.axes], 1 / following.axes, atol=0.1)
 
@@ -393,7 +397,9 @@ def test_many_lights_cover_all_directions(task: Roam, follower: type):
 def test_lights_in_water_form_tetrahedra_and_crosses(task: Roam):
     following = FollowInWater(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=1 + 3 * 100, variety=100)
-    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
+    lights = (
+        np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
+    )
     cosines = [np.sort(np.r_[1, one[:, 0]]) for one in lights[1:].reshape(100, 3, 3)]
     solid, cross = ([-1 / 3] * 3 + [1], [-1, 0, 0, 1])
     solids = sum(bool(np.allclose(found, solid, atol=1e-5)) for found in cosines)
