@@ -6,7 +6,7 @@ import numpy as np
 
 from mjxgait import certification
 from mjxgait.api.make import load_creature
-from mjxgait.api.run import Place, Run, open
+from mjxgait.api.run import Place, Run, opened
 from mjxgait.certification import Certificate, CertificateConfig
 from mjxgait.certification.validity import differences
 from mjxgait.config.tables import build, read_toml
@@ -26,7 +26,7 @@ def certify(run: Run | Place, config: Place | None = None) -> Certificate:
     Raises:
       UserError: no run, no champion, an invalid file, or the folder cannot be written.
     """
-    known = run if isinstance(run, Run) else open(run)
+    known = opened(run)
     certificate, path = examine(known, config), known.folder / CERTIFICATE
     with disk_errors(path, "what was there before is as it was", "examine it again"):
         write_text(path, certificate.to_json())
@@ -42,7 +42,7 @@ def examine(run: Run | Place, config: Place | None = None) -> Certificate:
     Raises:
       UserError: no run, no champion, or an invalid file.
     """
-    known = run if isinstance(run, Run) else open(run)
+    known = opened(run)
     table = read_toml(Path(config)) if config else {}
     champion = known.champion
     attempt = Exams(known.folder / EXAMS).attempt(
@@ -62,7 +62,7 @@ def verify(run: Run | Place) -> list[str]:
     Raises:
       UserError: no run, no champion, no certificate, or thresholds of another version.
     """
-    known = run if isinstance(run, Run) else open(run)
+    known = opened(run)
     stored, path = known.certificate, known.folder / CERTIFICATE
     if stored is None:
         raise UserError(
@@ -115,7 +115,7 @@ def walk(run: Run | Place, seconds: float = 12.0) -> dict[str, np.ndarray]:
     """
     from mjxgait.rendering.walk import record_walk
 
-    known = run if isinstance(run, Run) else open(run)
+    known = opened(run)
     if not seconds > 0:
         raise UserError(f"seconds = {seconds}: must be more than zero")
     creature = known.creature

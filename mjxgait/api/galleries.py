@@ -149,7 +149,7 @@ def _names(runs: Sequence[Path]) -> list[str]:
 
 def _title(shown: "Sequence[Entry]") -> str:
     tasks = dict.fromkeys(one.walk.champion.task for one in shown)
-    creatures = dict.fromkeys(one.walk.creature.name.replace("_", " ") for one in shown)
+    creatures = dict.fromkeys(one.walk.creature.title for one in shown)
     return f"{', '.join(creatures)}: {', '.join(tasks)}"
 
 

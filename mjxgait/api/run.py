@@ -132,7 +132,7 @@ def frames(runs: Iterable[Run | Place]) -> "pandas.DataFrame":
     Raises:
       UserError: see `Run.frame`; a folder is no run, or there is none.
     """
-    known = [one if isinstance(one, Run) else open(one) for one in runs]
+    known = [opened(one) for one in runs]
     if not known:
         raise UserError("frames: there is no run; name at least one run folder")
     tables = {str(one.folder): one.frame() for one in known}
@@ -147,6 +147,11 @@ def _pandas() -> Any:
     except ImportError:
         raise UserError(f"tables need pandas: {install_command('pandas')}") from None
     return pandas
+
+
+def opened(run: Run | Place) -> Run:
+    """Return a run, opened if it is a folder; raises as `open`."""
+    return run if isinstance(run, Run) else open(run)
 
 
 def open(folder: Place) -> Run:

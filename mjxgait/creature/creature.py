@@ -47,6 +47,11 @@ class Creature:
         return self.settings.creature.name
 
     @property
+    def title(self) -> str:
+        """Return the name in words."""
+        return self.name.replace("_", " ")
+
+    @property
     def nv(self) -> int:
         """Degrees of freedom."""
         return int(self.model.nv)

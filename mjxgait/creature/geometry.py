@@ -16,6 +16,14 @@ The axes of twenty joints within it are of rank one to within 0.01, the limit of
 """
 
 
+def posed(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
+    """Data of a model with bodies, joints and geoms placed for one pose [nq]; nothing else is set."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    return data
+
+
 def support_extents(geom_type: int, size: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     """Parameters `(r, b, e)` of a geom's support function.
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from mjxgait.creature.bars import Bar, bars_of
 from mjxgait.creature.creature import Creature
+from mjxgait.creature.geometry import posed
 from mjxgait.lru import LruCache
 
 NEAR = 0.1
@@ -115,9 +116,8 @@ def _search_key(creature: Creature) -> bytes:
 
 
 def _search(creature: Creature) -> Crossings:
-    model, data = creature.model, mujoco.MjData(creature.model)
-    data.qpos[:] = creature.stand_qpos
-    mujoco.mj_kinematics(model, data)
+    model = creature.model
+    data = posed(model, creature.stand_qpos)
     geoms, bars = all_bars(model)
     near = NEAR * creature.frame.hip_height
     strangers = ~neighbours(model, data, near, creature.settings.creature.planar)
@@ -247,9 +247,7 @@ def bar_places(
     model: mujoco.MjModel, qpos: np.ndarray, pairs: Crossings
 ) -> tuple[np.ndarray, np.ndarray]:
     """Middle and half axis of every bar in a pose [nq], both [S, 3] m in the world."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, qpos)
     rot = data.xmat[pairs.body].reshape(-1, 3, 3)
     turned = [np.einsum("sij,sj->si", rot, x) for x in (pairs.centre, pairs.half)]
     return data.xpos[pairs.body] + turned[0], turned[1]

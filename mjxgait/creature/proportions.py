@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.creature import Creature, vertical_freedom
-from mjxgait.creature.geometry import DOWN, geom_reach, shapes
+from mjxgait.creature.geometry import DOWN, geom_reach, posed, shapes
 from mjxgait.creature.scale import load_files, scaled_files
 from mjxgait.errors import UserError
 
@@ -113,9 +113,8 @@ def _heights(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
     A body's own lengths (its shapes, joints and the places of its children) grow by its factor, and
     orientations stay, so a height is a sum over the chain from the trunk.
     """
-    model, data = creature.model, mujoco.MjData(creature.model)
-    data.qpos[:] = creature.stand_qpos
-    mujoco.mj_kinematics(model, data)
+    model = creature.model
+    data = posed(model, creature.stand_qpos)
     bodies = model.nbody
     fixed, reach = np.zeros(bodies), np.zeros((bodies, bodies))
     for body in range(1, bodies):

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.creature.geometry import ancestors, subtree
+from mjxgait.creature.geometry import ancestors, posed, subtree
 from mjxgait.errors import UserError
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.shapes import Shape
@@ -106,9 +106,7 @@ def up_axis(
         )
         notes.guess("up", "xyz"[strongest], "high", "the file's gravity")
         return -np.sign(gravity[strongest]) * np.eye(3)[strongest]
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, qpos)
     leaves = [b for b in bodies if not (model.body_parentid == b).any()]
     hips = [
         next(
@@ -162,7 +160,7 @@ class Anatomy:
     shapes: dict[int, list[Shape]]
     lowered: bool = False
 
-    def low(self, model: mujoco.MjModel, bodies: Sequence[int]) -> float:
+    def low(self, bodies: Sequence[int]) -> float:
         """Lowest point in m of some bodies; the lowest body frame where they have no shapes."""
         heights = []
         for b in bodies:
@@ -185,9 +183,7 @@ def measured(
     shapes: dict[int, list[Shape]],
 ) -> Anatomy:
     """Measure the creature in one pose, without joints and feet. axis: [3], up in the file."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, qpos)
     turn, bodies = turn_up(axis), list(shapes)
     xpos, xrot = scale * data.xpos @ turn.T, turn @ data.xmat.reshape(-1, 3, 3)
     return Anatomy(spec, qpos, xpos, xrot, bodies[0], bodies, [], [], scale, shapes)

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import geometry
+from mjxgait.creature.geometry import posed
 from mjxgait.creature.settings import RigSettings
 from mjxgait.errors import UserError, listed
 from mjxgait.importer.anatomy import Anatomy, in_plane
@@ -280,9 +281,8 @@ def _sizes(best: Candidate, between_legs: bool) -> tuple[float, float, bool]:
     shuffling. So it is no shorter than its legs.
     between_legs: whether only the trunk between the legs, and they, count.
     """
-    model, data = best.kinematics.model, mujoco.MjData(best.kinematics.model)
-    data.qpos[:] = best.qpos
-    mujoco.mj_kinematics(model, data)
+    model = best.kinematics.model
+    data = posed(model, best.qpos)
     legs = {b for group in best.kinematics.feet for b in geometry.ancestors(model, group[0] + 1)}
     counted = legs if between_legs else None
     length = geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]), counted)

@@ -141,7 +141,7 @@ def plan_drive(
         "range", "by what each joint does", "low", "40 degrees and less, within the file's limits"
     )
     if not planar:
-        _steering(kinematics, stance, drive, moves)
+        _steering(kinematics, stance, drive)
     _balance(kinematics, stance, drive, moves, planar)
     drive.must_step = _must_step(kinematics, stance)
     if drive.must_step:
@@ -289,7 +289,7 @@ def _bend_one_way(kinematics: KinematicModel, q: np.ndarray, drive: Drive, notes
         )
 
 
-def _steering(kinematics: KinematicModel, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
+def _steering(kinematics: KinematicModel, stance: Stance, drive: Drive) -> None:
     """Set the steering weights: left legs stride longer, and a spine joint bends about z."""
     for f in range(len(kinematics.feet)):
         side = float(kinematics.data.xpos[kinematics.feet[f][0] + 1][1])

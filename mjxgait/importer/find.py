@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.creature.geometry import ancestors, subtree
+from mjxgait.creature.geometry import ancestors, posed, subtree
 from mjxgait.errors import UserError, listed
 from mjxgait.importer.anatomy import (
     HINGE,
@@ -139,9 +139,7 @@ def _freeze_least(
     model: mujoco.MjModel, anatomy: Anatomy, keep: Sequence[str], notes: Notes
 ) -> None:
     """Keep in each leg the joints that swing its end farthest; an insect's toes freeze."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = anatomy.qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, anatomy.qpos)
     kept = set()
     for foot in anatomy.feet:
         chain = ancestors(model, foot)

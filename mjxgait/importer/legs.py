@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.creature.geometry import ancestors, subtree
+from mjxgait.creature.geometry import ancestors, posed, subtree
 from mjxgait.errors import UserError, listed
 from mjxgait.importer.anatomy import FREE, HINGE, SLIDE, Anatomy
 from mjxgait.importer.notes import Notes
@@ -89,18 +89,16 @@ def find_feet(
     for b in anatomy.bodies:
         segments.setdefault(_segment(model, b, movers), []).append(b)
     ends = _ends(model, movers)
-    floor = min(anatomy.low(model, inside) for inside in segments.values())
+    floor = min(anatomy.low(inside) for inside in segments.values())
     top = max(float(anatomy.xpos[b][2]) for b in anatomy.bodies)
     span = float(np.ptp(anatomy.xpos[anatomy.bodies], axis=0).max())
     height = max(top - floor, 0.1 * span, 1e-6)
     ends = _without_toes(model, anatomy, ends, movers)
     ends = [b for b in ends if not _named_otherwise(model, b, movers)] or ends
     ends = [b for b in ends if limbs is None or model.body(b).name in limbs] or ends
-    feet = sorted(
-        b for b in ends if anatomy.low(model, subtree(model, b)) <= floor + SAME_LEVEL * height
-    )
+    feet = sorted(b for b in ends if anatomy.low(subtree(model, b)) <= floor + SAME_LEVEL * height)
     if not feet:
-        lowest = min(ends, key=lambda b: anatomy.low(model, subtree(model, b)))
+        lowest = min(ends, key=lambda b: anatomy.low(subtree(model, b)))
         raise NoLegs(
             f'no limb reaches the floor: "{model.body(anatomy.root).name}" itself lies lowest, the '
             f'lowest limb "{model.body(lowest).name}" '
@@ -139,9 +137,7 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
 
     Used for files with folded or stretched legs in their zero pose.
     """
-    data, rng = mujoco.MjData(model), np.random.default_rng(0)
-    data.qpos[:] = anatomy.qpos
-    mujoco.mj_kinematics(model, data)
+    data, rng = posed(model, anatomy.qpos), np.random.default_rng(0)
     up = anatomy.xrot[anatomy.root] @ data.xmat[anatomy.root].reshape(3, 3).T
     movers = {int(model.jnt_bodyid[j]) for j in movable}
     for end in _ends(model, movers):

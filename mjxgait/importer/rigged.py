@@ -44,7 +44,7 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
     _check(path, rig)
     upward = Guess("up", up, "high", "as given") if up else _upward(rig)
     axis = "xyz".index(upward.value)
-    plan = Plan(axis, _measured(path, rig, axis, height, notes))
+    plan = Plan(axis, _measured(rig, axis, height, notes))
     if not plan.limbs:
         raise UserError(
             f"{path}: all its bones begin in the middle; a creature needs legs to its left and right"
@@ -144,7 +144,7 @@ def _upward(rig: Rig) -> Guess:
     return Guess("up", UP, sure, "as in most BVH files")
 
 
-def _measured(path: Path, rig: Rig, up: int, height: float | None, notes: Notes) -> Rig:
+def _measured(rig: Rig, up: int, height: float | None, notes: Notes) -> Rig:
     """Return the skeleton in metres."""
     tall = float(np.ptp(np.concatenate([rig.places, *rig.ends, *rig.skins])[:, up]))
     if height is not None:

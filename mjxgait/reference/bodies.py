@@ -11,6 +11,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from mjxgait.creature import Creature
+from mjxgait.creature.geometry import posed
 from mjxgait.reference.layout import (
     Layout,
     LowestPoint,
@@ -271,9 +272,7 @@ class Bodies:
         Otherwise joint noise would begin with a kick.
         """
         self.batch.forward(stage=VELOCITY_STAGE)
-        standing = mujoco.MjData(model)
-        standing.qpos[:] = self.creature.stand_qpos
-        mujoco.mj_kinematics(model, standing)
+        standing = posed(model, self.creature.stand_qpos)
         usual = self.solid.lowest(standing.geom_xpos[None], standing.geom_xmat[None])
         self.qpos[:, self.layout.root_qpos + 2] += np.maximum(
             usual - self.solid.lowest(self.geom_xpos, self.geom_xmat), 0

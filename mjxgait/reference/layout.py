@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
-from mjxgait.creature.geometry import support_extents
+from mjxgait.creature.geometry import posed, support_extents
 
 FLOOR = "floor"
 
@@ -61,9 +61,7 @@ class StartFrame:
 
 def start_frame(creature: Creature) -> StartFrame:
     """Compute the start frame from the standing pose with MuJoCo's kinematics."""
-    data = mujoco.MjData(creature.model)
-    data.qpos[:] = creature.stand_qpos
-    mujoco.mj_kinematics(creature.model, data)
+    data = posed(creature.model, creature.stand_qpos)
     rot = data.xmat[creature.trunk].reshape(3, 3)
     forward, left = (
         _horizontal(rot @ axis) for axis in (creature.frame.forward, creature.frame.left)

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
+from mjxgait.creature.geometry import posed
 from mjxgait.reference.grown import Grown, seen_grown
 from mjxgait.reference.layout import foot_middles, level_nose, start_frame
 from mjxgait.reference.outcome import Trajectory
@@ -118,9 +119,7 @@ class Recording:
 def dimensions(creature: Creature) -> Dimensions:
     """Return the sizes of a creature."""
     model = creature.model
-    data = mujoco.MjData(model)
-    data.qpos[:] = creature.stand_qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, creature.stand_qpos)
     axes = data.xmat[creature.trunk].reshape(3, 3) @ np.stack(
         [creature.frame.forward, creature.frame.left], 1
     )

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
+from mjxgait.creature.geometry import posed
 
 ONE_PLACE = 0.02
 """Hip heights within which joints between two parts count as one, as the three of a ball joint."""
@@ -95,9 +96,7 @@ def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int
     In a planar body, pairs of limbs with parallel axes are included: they can only pass each other.
     MuJoCo excludes parent and child by itself; they are listed all the same.
     """
-    data = mujoco.MjData(model)
-    data.qpos[:] = creature.stand_qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, creature.stand_qpos)
     chains = [_chain(model, body) for body in range(model.nbody)]
 
     def joined(one: int, other: int) -> bool:

@@ -96,7 +96,7 @@ def draw_strobe(drawing: Figure, walk: Walk, picture: Image.Image) -> None:
     axes = drawing.subplots()
     axes.imshow(picture, interpolation="lanczos")
     axes.set_axis_off()
-    name, seconds = walk.creature.name.replace("_", " "), frames[-1] * walk.time_step
+    name, seconds = walk.creature.title, frames[-1] * walk.time_step
     axes.set_title(f"{name}: {len(frames)} moments of {seconds:.1f} s")
 
 

@@ -84,7 +84,7 @@ def write_captions(
 
 def spoken(walk: Walk) -> str:
     """Return the creature's name as written in pictures."""
-    return walk.creature.name.replace("_", " ")
+    return walk.creature.title
 
 
 def condition(walk: Walk, time: float) -> str:

@@ -3,9 +3,7 @@
 import base64
 import html
 import json
-import string
 from collections.abc import Sequence
-from importlib import resources
 
 import numpy as np
 
@@ -14,7 +12,7 @@ from mjxgait.animation.export.school import School, Track, build_school
 from mjxgait.errors import UserError
 from mjxgait.rendering.gallery import Entry, tally
 from mjxgait.web.certificate import table
-from mjxgait.web.page import style, viewer_script
+from mjxgait.web.templates import asset, embedded_viewer, style, template
 
 RATE = 25
 """Key frames per second; the page interpolates."""
@@ -25,21 +23,20 @@ DIGITS = 4
 
 def build_gallery(shown: Sequence[Entry], title: str) -> str:
     """Return the text of the page. Swimmers have a scene of their own, below those on land."""
-    web = resources.files("mjxgait.web") / "assets"
     scenes = [
         _scene([one for one in shown if one.walk.afloat == water], water)
         for water in (False, True)
         if any(one.walk.afloat == water for one in shown)
     ]
     certified = sum(one.certified for one in shown)
-    return string.Template((web / "gallery.html").read_text(encoding="utf-8")).substitute(
+    return template("gallery.html").substitute(
         title=html.escape(title),
         style=style(),
         lead=html.escape(f"{certified} of {len(shown)} certified. By strategy: {tally(shown)}."),
         facts=json.dumps({"scenes": scenes}).replace("<", "\\u003c"),
         table=_table(shown),
-        viewer=viewer_script(),
-        code=(web / "gallery.js").read_text(encoding="utf-8"),
+        viewer=embedded_viewer(),
+        code=asset("gallery.js"),
     )
 
 

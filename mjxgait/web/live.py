@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib import resources
 from pathlib import Path
 from socket import socket
 from typing import Any
@@ -32,6 +31,7 @@ from mjxgait.training.folder import (
     open_run,
     read_metrics,
 )
+from mjxgait.web.templates import asset, viewer_script
 
 HERE = "127.0.0.1"
 PORTS = range(8765, 8785)
@@ -95,7 +95,7 @@ class Watcher:
             {key: line.get(key) for key in ("generation", "best", "mean", "forced")}
             for line in lines
         ]
-        name = self.creature.name.replace("_", " ")
+        name = self.creature.title
         return {"name": name, "what": what, "version": self.shown.version, "history": history}
 
     def _shown(self) -> Shown:
@@ -214,18 +214,11 @@ class _Handler(BaseHTTPRequestHandler):
         if self.headers.get("Host", "").rsplit(":", 1)[0] not in (HERE, "localhost"):
             self.send_error(HTTPStatus.FORBIDDEN)
             return
-        web = resources.files("mjxgait.web") / "assets"
         match self.path.split("?")[0]:
             case "/":
-                self._send((web / "live.html").read_bytes(), "text/html; charset=utf-8")
+                self._send(asset("live.html").encode(), "text/html; charset=utf-8")
             case "/viewer.js":
-                # The source map is not served.
-                self._send(
-                    (web / "model-viewer.min.js")
-                    .read_bytes()
-                    .rsplit(b"//# sourceMappingURL", 1)[0],
-                    "text/javascript",
-                )
+                self._send(viewer_script().encode(), "text/javascript")
             case "/state.json":
                 self._send(json.dumps(self.follows.state()).encode(), "application/json")
             case "/walk.glb" if self.follows.shown.version:

@@ -3,9 +3,7 @@
 import base64
 import html
 import json
-import string
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
 from io import BytesIO
 from pathlib import Path
 
@@ -19,6 +17,7 @@ from mjxgait.rendering.video import LOOP_SECONDS
 from mjxgait.rendering.walk import Walk, doubt, record_walk
 from mjxgait.training.folder import METRICS, open_champion, read_metrics
 from mjxgait.web.certificate import certificate_summary, certificate_table, table
+from mjxgait.web.templates import embedded_viewer, style, template
 
 RATE = 30
 FARTHEST = 3.0
@@ -52,25 +51,11 @@ def save_page(out: Path, page: str) -> None:
         files.write_text(out, page)
 
 
-def style() -> str:
-    """Return the rules that pages have in common."""
-    return (resources.files("mjxgait.web") / "assets" / "style.css").read_text(encoding="utf-8")
-
-
-def viewer_script() -> str:
-    """Return the viewer's script, ready to be embedded in a page."""
-    script = resources.files("mjxgait.web") / "assets" / "model-viewer.min.js"
-    # Browser tools would request the source map.
-    text = script.read_text(encoding="utf-8").rsplit("//# sourceMappingURL", 1)[0]
-    return text.replace("</script", "<\\/script")
-
-
 def build_page(walk: Walk, loop: WalkLoop, verdict: str, sections: str) -> str:
     """Return the text of the page. verdict, sections: HTML above and below the walk."""
-    web = resources.files("mjxgait.web") / "assets"
     target, far = viewpoint(loop)
-    return string.Template((web / "page.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(walk.creature.name.replace("_", " ")),
+    return template("page.html").substitute(
+        title=html.escape(walk.creature.title),
         style=style(),
         lead=html.escape(_lead(walk, loop)),
         around="water" if walk.afloat else "sand" if walk.grown else "",
@@ -82,7 +67,7 @@ def build_page(walk: Walk, loop: WalkLoop, verdict: str, sections: str) -> str:
         far=f"{far:.3f}m",
         farthest=f"{FARTHEST * far:.3f}m",
         frames=len(loop.times) - 1,
-        viewer=viewer_script(),
+        viewer=embedded_viewer(),
         sections=sections,
     )
 
@@ -166,9 +151,8 @@ def driven_page(
     """
     creature = next(iter(loops.values())).walk.creature
     glb, apart = build_driven(loops)
-    page = resources.files("mjxgait.web") / "assets" / "drive.html"
-    return string.Template(page.read_text(encoding="utf-8")).substitute(
-        title=html.escape(creature.name.replace("_", " ")),
+    return template("drive.html").substitute(
+        title=html.escape(creature.title),
         walks=len(clips) - 1,
         of=of,
         blends=html.escape(blends),
@@ -177,5 +161,5 @@ def driven_page(
         glb=base64.b64encode(glb).decode("ascii"),
         target=f"0m {0.6 * creature.frame.stand_pos[2]:.3f}m 0m",
         far=f"{DRIVE_FAR * creature.model.stat.extent:.3f}m",
-        viewer=viewer_script(),
+        viewer=embedded_viewer(),
     )

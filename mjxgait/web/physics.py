@@ -4,9 +4,6 @@ import base64
 import gzip
 import html
 import json
-import string
-from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 
 import mujoco
@@ -15,11 +12,13 @@ import numpy as np
 from mjxgait.animation.export.bodies import build_bodies, shown_bodies
 from mjxgait.certification import CertificateConfig
 from mjxgait.creature import Creature
+from mjxgait.creature.geometry import posed
 from mjxgait.rendering.painter import seen_geoms
 from mjxgait.rendering.walk import doubt, record_walk
 from mjxgait.training.folder import open_champion
 from mjxgait.web.facts import Facts, facts_of
-from mjxgait.web.page import save_page, style, viewer_script
+from mjxgait.web.page import save_page
+from mjxgait.web.templates import asset, embedded_viewer, style, template
 from mjxgait.web.wasm import PACKAGE, VERSION, Engine, engine_from
 
 SECONDS = 5.0
@@ -83,7 +82,6 @@ def build_physics_page(
     shown: the creature's model with its looks, if it has others. said: the notice of `doubt`;
     empty if it is certified.
     """
-    web = resources.files("mjxgait.web") / "assets"
     shown = shown or creature.model
     height, radius = _extent(shown, creature.stand_qpos)
     far = radius / np.sin(WIDE / 2)
@@ -100,12 +98,12 @@ def build_physics_page(
     }
     lead = f"{LEAD} {said or 'Undisturbed, it is certified'}."
     script = engine.script.replace(EXPORT, "globalThis.loadMujoco = loadMujoco;")
-    return string.Template((web / "physics.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(creature.name.replace("_", " ")),
+    return template("physics.html").substitute(
+        title=html.escape(creature.title),
         style=style(),
         lead=html.escape(lead),
         contents=html.escape(CONTENTS),
-        licence=html.escape((web / "model-viewer.LICENSE").read_text(encoding="utf-8")),
+        licence=html.escape(asset("model-viewer.LICENSE")),
         glb=base64.b64encode(glb).decode("ascii"),
         target=f"0m {height:.3f}m 0m",
         wide=f"{np.degrees(WIDE):g}deg",
@@ -115,28 +113,25 @@ def build_physics_page(
         page=_json(page),
         # The same bytes on every day and machine.
         binary=base64.b64encode(gzip.compress(engine.binary, 6, mtime=0)).decode("ascii"),
-        viewer=viewer_script(),
+        viewer=embedded_viewer(),
         engine=script.replace("</script", "<\\/script"),
-        modules="\n".join(_module(web / name, kind) for name, kind in CLASSES.items()),
-        code=(web / "physics.js").read_text(encoding="utf-8"),
+        modules="\n".join(_module(name, kind) for name, kind in CLASSES.items()),
+        code=asset("physics.js"),
     )
 
 
 def _extent(model: mujoco.MjModel, qpos: np.ndarray) -> tuple[float, float]:
     """Height of a body's middle, and radius of a ball about it in which all of it is, in m."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, qpos)
     seen = [geom for geom in seen_geoms(model) if model.geom_bodyid[geom]]
     places, radii = data.geom_xpos[seen], model.geom_rbound[seen][:, None]
     low, high = (places - radii).min(0), (places + radii).max(0)
     return float((low + high)[2] / 2), float(np.linalg.norm(high - low) / 2)
 
 
-def _module(file: Traversable, kind: str) -> str:
+def _module(name: str, kind: str) -> str:
     """Script element with a module, whose class other scripts find under its name."""
-    text = file.read_text(encoding="utf-8")
-    return f'<script type="module">\n{text}\nglobalThis.{kind} = {kind};\n</script>'
+    return f'<script type="module">\n{asset(name)}\nglobalThis.{kind} = {kind};\n</script>'
 
 
 def _json(value: object) -> str:

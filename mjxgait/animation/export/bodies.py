@@ -15,6 +15,7 @@ from mjxgait.animation.export.shaped import material_of, shaped
 from mjxgait.animation.export.skeleton import gltf_axes, quaternions
 from mjxgait.animation.export.surface import Surface, geom_surface
 from mjxgait.creature import Creature
+from mjxgait.creature.geometry import posed
 from mjxgait.reference.layout import start_frame
 from mjxgait.rendering.painter import geom_colours, seen_geoms
 
@@ -41,9 +42,7 @@ def build_bodies(creature: Creature, model: mujoco.MjModel, afloat: bool) -> tup
         gltf.Node(name="ground"),
         gltf.Node(name="world", rotation=turn, children=[*range(first, first + len(bodies))]),
     ]
-    data = mujoco.MjData(model)
-    data.qpos[:] = creature.stand_qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, creature.stand_qpos)
     for body in bodies:
         place, about = data.xpos[body].tolist(), np.roll(data.xquat[body], -1).tolist()
         mesh = body_mesh(document, buffer, model, body)

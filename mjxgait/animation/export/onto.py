@@ -11,7 +11,6 @@ import itertools
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation
@@ -32,7 +31,7 @@ from mjxgait.animation.export.skeleton import (
     world_poses,
 )
 from mjxgait.creature import Creature
-from mjxgait.creature.geometry import DOWN, geom_reach
+from mjxgait.creature.geometry import DOWN, geom_reach, posed
 from mjxgait.errors import UserError, listed
 from mjxgait.files import write_bytes, writing
 
@@ -176,9 +175,8 @@ def _fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> F
 
 def _lows_at_rest(loop: WalkLoop) -> np.ndarray:
     """Heights [F] in m of the lowest points of the feet's geoms in the rest pose."""
-    model, data = loop.walk.creature.model, mujoco.MjData(loop.walk.creature.model)
-    data.qpos[:] = resting(loop)
-    mujoco.mj_kinematics(model, data)
+    model = loop.walk.creature.model
+    data = posed(model, resting(loop))
     geoms = loop.walk.creature.feet.stepping
     return np.array([-geom_reach(model, data, geom, DOWN) for geom in geoms])
 

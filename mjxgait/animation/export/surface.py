@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.animation.export.skeleton import Skeleton, world_poses
+from mjxgait.creature.geometry import posed
 from mjxgait.rendering.painter import geom_colours, seen_geoms
 from mjxgait.rendering.shapes import mesh_of
 
@@ -59,9 +60,7 @@ def disc(radius: float) -> Surface:
 
 def far_end(model: mujoco.MjModel, body: int, qpos: np.ndarray) -> np.ndarray:
     """Vector [3] in m, in the world, from a body's origin to the mean of its farthest points."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, qpos)
     points = [np.zeros((1, 3))]
     for geom in np.flatnonzero(model.geom_bodyid == body):
         local, _, _ = geom_surface(model, int(geom))
@@ -227,9 +226,7 @@ def _tipped(
 
 def _hinges(model: mujoco.MjModel, rest: np.ndarray, axes: np.ndarray) -> dict[int, np.ndarray]:
     """Axis [3] of each body's last hinge: a turn about it changes only the hinge's angle."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = rest
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, rest)
     hinges = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)
     return {int(model.jnt_bodyid[j]): axes @ data.xaxis[j] for j in hinges}
 
@@ -267,9 +264,7 @@ def pieces_of(
     model: mujoco.MjModel, skeleton: Skeleton, axes: np.ndarray, rest: np.ndarray
 ) -> list[Piece]:
     """The visible surface of the skeleton's bodies in a pose [nq]."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = rest
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, rest)
     colours = geom_colours(model)
     geoms = [int(g) for g in seen_geoms(model) if int(model.geom_bodyid[g]) in skeleton.bodies]
     return [

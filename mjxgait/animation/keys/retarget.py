@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.clips.clip import Clip
 from mjxgait.creature import Creature
-from mjxgait.creature.geometry import ancestors
+from mjxgait.creature.geometry import ancestors, posed
 from mjxgait.errors import UserError, did_you_mean
 
 LIKE = 0.6
@@ -208,9 +208,7 @@ def _trunk_bone(clip: Clip, parts: Mapping[int, int], creature: Creature) -> int
 def _world(creature: Creature, clip: Clip) -> dict[int, np.ndarray]:
     """World rotation [3, 3] of each body in the rest pose of the file, or of our own export."""
     model = creature.model if clip.note else creature.rest_model
-    data = mujoco.MjData(model)
-    data.qpos[:] = creature.rest_qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, creature.rest_qpos)
     return {b: data.xmat[b].reshape(3, 3).copy() for b in range(creature.model.nbody)}
 
 
@@ -320,7 +318,5 @@ def rig_axes(creature: Creature) -> np.ndarray | None:
     """The axes of the file that the creature was imported from; None if it was not a rig."""
     if not creature.is_rig:
         return None
-    data = mujoco.MjData(creature.model)
-    data.qpos[:] = creature.rest_qpos
-    mujoco.mj_kinematics(creature.model, data)
+    data = posed(creature.model, creature.rest_qpos)
     return np.array(data.xmat[creature.trunk].reshape(3, 3).T)

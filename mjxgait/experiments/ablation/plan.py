@@ -160,7 +160,7 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
     Raises:
       UserError: an unknown key, a bad value, two variants of one name, or two that are equal.
     """
-    tables = list(study.variant) or _grid(study, where)
+    tables = list(study.variant) or _grid(study)
     configs: dict[str, Config] = {}
     for table in tables:
         if table.name in configs:
@@ -257,7 +257,7 @@ def _lay(config: Config, table: Table, where: str) -> Config:
     return laid
 
 
-def _grid(study: Study, where: str) -> list[VariantTable]:
+def _grid(study: Study) -> list[VariantTable]:
     """Return the base and every combination of the grid's values."""
     rows = [VariantTable("base")]
     for values in itertools.product(*study.grid.values()):
