@@ -6,7 +6,6 @@ from pathlib import Path
 
 import tyro
 
-from mjxgait.api import certify, examine_expressions
 from mjxgait.cli.options import parsed
 from mjxgait.errors import UserError
 from mjxgait.files import write_text
@@ -55,6 +54,8 @@ def certify_command(arguments: Sequence[str]) -> int:
             "name the run to examine: mjxgait certify RUN; --env and --out are for a program: "
             "mjxgait certify --env luxo --expressions FILE"
         )
+    from mjxgait.api import certify  # JAX takes a second to import
+
     certificate = certify(options.run, options.config)
     from mjxgait.training.screen import Screen  # rich is slow to import
 
@@ -73,6 +74,8 @@ def _certify_expressions(options: CertifyOptions, file: Path) -> int:
         if options.out.exists():
             raise UserError(f"--out {options.out}: exists already; name another file")
         require_writable(options.out)
+    from mjxgait.api import examine_expressions
+
     certificate = examine_expressions(options.env, file, options.task, options.config)
     from mjxgait.training.screen import Screen
 

@@ -6,14 +6,9 @@ from pathlib import Path
 
 import tyro
 
-from mjxgait.api import load_creature
-from mjxgait.certification.check_body import check_body
-from mjxgait.certification.feasibility import feasibility
 from mjxgait.cli.options import parsed
-from mjxgait.creature import load_creature as load_folder
 from mjxgait.errors import UserError
 from mjxgait.files import replaced, writing
-from mjxgait.tasks.walk.targets import WalkTargets, configured
 from mjxgait.training.disk import require_writable
 
 
@@ -36,21 +31,27 @@ class CheckOptions:
 def check_command(arguments: Sequence[str]) -> int:
     """Return the exit code: 1 for a creature that is valid but does not stand."""
     options = parsed(CheckOptions, "check", arguments)
+    # JAX takes a second to import.
+    from mjxgait.api import load_creature
+    from mjxgait.certification.check_body import check_body
+    from mjxgait.certification.feasibility import feasibility
+    from mjxgait.creature import load_creature as load_folder
+    from mjxgait.importer.portrait import facts, portrait
+    from mjxgait.importer.stand_test import stand_test
+    from mjxgait.physics import fallback_note
+    from mjxgait.tasks.walk.targets import WalkTargets, configured
+
     folder = Path(options.env)
     creature = load_folder(folder) if folder.is_dir() else load_creature(options.env, tell=print)
     configured(creature, None, {}, WalkTargets())
     grows = creature.settings.creature.grows
     if not grows:
         check_body(creature)
-    from mjxgait.importer.portrait import facts, portrait
-    from mjxgait.importer.stand_test import stand_test
 
     out = options.out or Path(f"{creature.name}-check.png")
     if out.suffix.lower() != ".png":
         raise UserError(f"{out}: the picture is a PNG; name it something.png")
     require_writable(out)
-    from mjxgait.physics import fallback_note
-
     held = stand_test(creature)
     print("\n".join(facts(creature, held)))
     if not grows:

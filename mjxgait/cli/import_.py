@@ -8,8 +8,6 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
-from mjxgait.api.bodies import into_folder
-from mjxgait.certification.feasibility import feasibility
 from mjxgait.cli.options import parsed
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
@@ -72,6 +70,10 @@ def import_command(arguments: Sequence[str]) -> int:
     )
     if not (0 < options.seconds < np.inf and 0 < options.gigabytes < np.inf):
         raise UserError("--seconds and --gigabytes: give numbers above zero")
+    # JAX takes a second to import.
+    from mjxgait.api.bodies import into_folder
+    from mjxgait.certification.feasibility import feasibility
+
     imported = into_folder(options.model, options.out, choices, options.force)
     print(imported.notes.text())
     print(f"wrote {options.out}; look at it with: mjxgait check {options.out}")

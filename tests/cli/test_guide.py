@@ -59,9 +59,8 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("command", list(commands()))
 def test_a_command_of_the_guide_is_accepted(command: str, monkeypatch: pytest.MonkeyPatch):
     _, *words = [PLACEHOLDERS.get(word, word) for word in shlex.split(command)]
-    module = importlib.import_module(
-        f"mjxgait.cli.{'import_' if words[0] == 'import' else words[0]}"
-    )
+    file = {"import": "import_", "train": "training"}.get(words[0], words[0])
+    module = importlib.import_module(f"mjxgait.cli.{file}")
     if words[0] == "train":
         monkeypatch.setattr(module, "evolve", begin)
         monkeypatch.setattr(module, "evolve_zoo", begin)

@@ -16,7 +16,7 @@ from mjxgait.api.bodies import write_folder
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.cli import main
-from mjxgait.cli.train import _layers
+from mjxgait.cli.training import _layers
 from mjxgait.config.layers import find_creature, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mjxgait.cli.train import _plot_fitness
+from mjxgait.cli.training import _plot_fitness
 from mjxgait.errors import UserError
 from mjxgait.training.disk import disk_errors, require_writable, try_room
 

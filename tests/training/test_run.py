@@ -317,7 +317,7 @@ def test_a_finished_run_says_how_to_go_on_and_does_nothing(
     shutil.copytree(finished[0], folder)
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     with monkeypatch.context() as patch:
-        patch.setattr("mjxgait.cli.train.evolve", None)
+        patch.setattr("mjxgait.cli.training.evolve", None)
         said = said_by(capsys, "train", "--resume", folder, code=0)
     assert said == (
         f"{folder}: nothing is left to do: all 7 generations are done. "
@@ -365,7 +365,7 @@ def test_next_steps_are_printed_before_plots_that_may_be_interrupted(
     def interrupted(run: Path):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mjxgait.cli.train.evolve", lambda *given: given[-2]() is None)
+    monkeypatch.setattr("mjxgait.cli.training.evolve", lambda *given: given[-2]() is None)
     monkeypatch.setattr("mjxgait.rendering.plots.plot_run", interrupted)
     said = said_by(capsys, "train", "--env", STOOL, "--out", tmp_path / "run", code=130)
     assert said.index("Next:") < said.index("Drawing") < said.index("mjxgait plot")

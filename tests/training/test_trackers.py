@@ -114,8 +114,8 @@ def test_train_passes_its_generations_on(tmp_path: Path, monkeypatch, capsys):
         screen.generation(whole, config)
         return False
 
-    monkeypatch.setattr("mjxgait.cli.train.evolve", evolve)
-    monkeypatch.setattr("mjxgait.cli.train._draw", lambda *_, **__: True)
+    monkeypatch.setattr("mjxgait.cli.training.evolve", evolve)
+    monkeypatch.setattr("mjxgait.cli.training._draw", lambda *_, **__: True)
     names = ["--log", "tensorboard", "--log", "tensorboard"]
     said_by(capsys, "train", "--env", STOOL, "--out", tmp_path / "x", *names, code=130)
     assert seen(tmp_path / "x")[0]["term/alive"] == 0.5

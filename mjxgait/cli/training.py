@@ -1,0 +1,252 @@
+"""What `mjxgait train` does: read the options, evolve, draw."""
+
+import argparse
+import contextlib
+import dataclasses
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mjxgait.api import Run, load_creature
+from mjxgait.api.make import attempts, evolve
+from mjxgait.api.multi_seed import evolve_zoo
+from mjxgait.cli.options import parsed
+from mjxgait.cli.train_options import TrainOptions, options_of
+from mjxgait.config.schema import Config, ExaminationConfig
+from mjxgait.config.tables import build, merge, not_none
+from mjxgait.controllers.expressions.written import with_expressions
+from mjxgait.creature import Creature
+from mjxgait.creature.scale import at_step, parse_scales
+from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.experiments.multi_seed import check_zoo, create_zoo, folders_of, is_zoo
+from mjxgait.output import Output
+from mjxgait.plugins.registry import meant
+from mjxgait.tasks.walk.targets import (
+    TARGETS,
+    WalkTargets,
+    configured,
+    hint,
+)
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import (
+    METRICS,
+    PLOT,
+    PLOTS,
+    command,
+    create_run,
+    open_run,
+    read_metrics,
+)
+
+if TYPE_CHECKING:  # JAX takes a second to import
+    from mjxgait.training.screen import Screen
+
+
+def train(arguments: Sequence[str]) -> int:
+    """Evolve what these options name; return the exit code."""
+    notes: list[str] = []
+    creature, default = _layers(arguments, notes.append)
+    shape = options_of(type(default))
+    options = parsed(shape, "train", arguments, shape(settings=default))
+    config = _settings(options)
+    if not options.resume:
+        creature = at_step(creature, config.rollout.step)
+        if options.expressions:
+            config = with_expressions(creature, config, options.expressions)
+    elif options.expressions:
+        raise UserError(
+            f"{options.resume}: a resumed run keeps the programs that it began with; --expressions "
+            "needs a new run"
+        )
+    if options.source and (options.resume or options.runs is not None):
+        raise UserError("--from: for a single new run, without --resume and --runs")
+    if not options.quiet:
+        for line in (*notes, *filter(None, [hint(config)])):
+            print(line)
+    if options.tries != 1 and (options.resume or options.runs is not None):
+        raise UserError("--tries: for new runs one after another, without --resume and --runs")
+    if options.runs is not None or _is_zoo(options.resume):
+        return _several(options, creature, config, default)
+    if options.generation is not None and options.resume is None:
+        raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
+    if options.resume is None:
+        return _until_certified(options, creature, config)
+    _check_resumed(options, config, default)
+    from mjxgait.training.ended import nothing_left  # leads to JAX
+
+    over = options.generation is None and nothing_left(options.resume, creature, config, default)
+    if over:
+        print(over)
+        return 0
+    return _evolve(options, options.resume, creature, config)
+
+
+def _check_resumed(options: TrainOptions, config: Config, default: Config) -> None:
+    """Reject changes that a resumed run cannot make. default: the settings of its folder."""
+    if options.scale or options.way != "forward":
+        raise UserError(
+            f"{options.resume}: a resumed run keeps its body; --scale and --way need a new run"
+        )
+    if _without_ends(config) != _without_ends(default):
+        raise UserError(
+            f"{options.resume}: a resumed run keeps its settings; only --generations, "
+            "--evolution.target and --examination may differ"
+        )
+
+
+def _until_certified(options: TrainOptions, creature: Creature, config: Config) -> int:
+    """Evolve new runs until one is certified; return the exit code."""
+    code = 0
+    for number, (folder, one) in enumerate(attempts(options.out, creature, config, options.tries)):
+        if number and not options.quiet:
+            print(f"Not certified: seed {one.seed} is next, {number + 1} of {options.tries}.")
+        code = _evolve(options, folder, creature, one)
+        if code or Run(folder).certified:
+            break
+    return code
+
+
+def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Config) -> int:
+    """Evolve a new or resumed run and draw it; return the exit code."""
+    # JAX takes a second to import, so the options are checked first.
+    from mjxgait.cli.view import following
+    from mjxgait.training.stages import prepare_devices
+    from mjxgait.training.trackers import tracked
+
+    prepare_devices(1 if options.cluster else None)
+    resumed = options.resume is not None
+    with contextlib.ExitStack() as beside:
+        screen = beside.enter_context(tracked(folder, options.log, options.quiet))
+
+        def begin() -> None:
+            if not resumed:
+                create_run(folder, creature, config)
+            if options.view:
+                beside.enter_context(following(folder))
+
+        at = options.generation, options.cluster
+        ended = evolve(folder, creature, config, screen, resumed, *at, begin, options.source)
+    if ended:
+        screen.next_steps(folder, Run(folder).certified)
+    drawn = _draw(folder, screen, all_plots=ended and options.plots)
+    return 0 if ended and drawn else INTERRUPTED
+
+
+def _several(options: TrainOptions, creature: Creature, config: Config, default: Config) -> int:
+    """Evolve several runs side by side; return the exit code."""
+    if options.view or options.log or options.generation is not None:
+        raise UserError("--runs: several runs have no --view, no --log and no --generation")
+    output = Output(quiet=options.quiet)
+    if options.resume is None:
+        assert options.runs is not None
+        # On a cluster each run is a job of its own, so that every machine gets work.
+        together = 1 if options.cluster else 0
+        zoo = check_zoo(options.out, creature, config, options.runs)
+        if config.evolution.ancestors.runs:
+            from mjxgait.experiments.ancestors import settings_of_ancestors  # leads to JAX
+
+            settings_of_ancestors(creature, config)
+        begin = partial(create_zoo, zoo, creature, config, options.runs, together)
+        ended = evolve_zoo(zoo, output, options.cluster, begin)
+        return 0 if ended else INTERRUPTED
+    other = options.scale or options.way != "forward"
+    if options.runs is not None or other or config != default:
+        raise UserError(
+            f"{options.resume}: resumed runs keep their number, body and settings; only --cluster "
+            "may be given"
+        )
+    return 0 if evolve_zoo(options.resume, output, options.cluster) else INTERRUPTED
+
+
+def _is_zoo(folder: Path | None) -> bool:
+    return folder is not None and is_zoo(folder)
+
+
+def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
+    """Draw the run, once its results are on the screen; return False if interrupted."""
+    try:
+        _plot_fitness(folder)
+        if all_plots:
+            screen.say(f"Drawing {folder / PLOTS}/; the run itself is done and safe.")
+            from mjxgait.rendering.plots import plot_run
+
+            plot_run(folder)
+    except KeyboardInterrupt:
+        screen.say(f"Not all is drawn; {command('plot', folder, run=folder)} draws it.")
+        return False
+    return True
+
+
+def _plot_fitness(folder: Path) -> None:
+    """Draw the fitness curve; matplotlib is slow to import, so only if there are data."""
+    if lines := read_metrics(folder / METRICS):
+        from mjxgait.rendering.curves import plot_fitness
+
+        with disk_errors(
+            folder / PLOT,
+            "the run itself is safe",
+            f"draw it with {command('plot', folder, run=folder)}",
+        ):
+            plot_fitness(lines, folder / PLOT)
+
+
+def _layers(
+    arguments: Sequence[str], tell: Callable[[str], object] = lambda said: None
+) -> tuple[Creature, Config]:
+    """Return the creature and the settings below the options; they are the options' defaults.
+
+    tell: called with the notes of the import of a model file.
+    """
+    early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    for name in ("--env", "--config", "--resume", "--use.controller", "--use.task"):
+        early.add_argument(name, nargs="?")
+    for name in TARGETS:
+        early.add_argument(f"--{name}", nargs="?")
+    early.add_argument("--scale", nargs="*")
+    early.add_argument("--way", nargs="?")
+    try:
+        given, _ = early.parse_known_args(list(arguments))
+    except argparse.ArgumentError as error:
+        raise UserError(str(error)) from None
+    requested = {name: getattr(given, name) for name in TARGETS}
+    if given.resume:
+        if any(requested.values()):
+            raise UserError(
+                f"{given.resume}: a resumed run keeps its settings; other targets need a new run"
+            )
+        folder = Path(given.resume)
+        return open_run(folders_of(folder)[0] if is_zoo(folder) else folder)
+    scales = parse_scales(given.scale or ())
+    way = given.way or "forward"
+    creature = load_creature(given.env or TrainOptions.env, scales, tell, way)
+    file = Path(given.config) if given.config else None
+    named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
+    use = {kind: name for kind, name in named.items() if name}
+    return creature, configured(creature, file, use, WalkTargets.of(requested))
+
+
+def _settings(options: TrainOptions) -> Config:
+    """Return the config with the short options applied, checked again.
+
+    The parser checks the types of options, not their ranges.
+    """
+    table = {
+        "use": dataclasses.asdict(meant(options.settings.use)),
+        "evolution": not_none(
+            population=options.population,
+            generations=options.generations,
+            body=options.evolve_body,
+            search=options.search,
+        ),
+        "rollout": not_none(ground=options.ground, physics=options.physics),
+    }
+    return build(
+        type(options.settings), merge(dataclasses.asdict(options.settings), table), "the options"
+    )
+
+
+def _without_ends(config: Config) -> Config:
+    """Return the settings that decide what a generation computes."""
+    endless = dataclasses.replace(config.evolution, generations=0, target=None)
+    return dataclasses.replace(config, evolution=endless, examination=ExaminationConfig())
