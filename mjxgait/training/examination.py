@@ -12,8 +12,8 @@ from mjxgait.certification import Certificate, NominalCheck, certify, nominal_ch
 from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.stress import Stress, stress
 from mjxgait.champion import Champion
-from mjxgait.config.schema import Config, ExaminationConfig
-from mjxgait.config.tables import STORED, Flag, Index, Text
+from mjxgait.config.schema import ExaminationConfig
+from mjxgait.config.tables import STORED, Finite, Flag, Index, Text
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import Experiment
@@ -23,12 +23,13 @@ from mjxgait.training.prescreen import Prescreen
 
 @dataclasses.dataclass(frozen=True)
 class _Exam:
-    """Schema of a line."""
+    """Schema of a line. margin: on the draw to choose on, of a champion without a certificate."""
 
     __pydantic_config__ = STORED
     generation: Index
     champion: Text
     passed: Flag
+    margin: Finite | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,10 +44,12 @@ class Exams:
 
     def failed(self, champion: str, generation: int) -> bool:
         """Return whether the champion of this fingerprint has failed up to this generation."""
-        failures = (line for line in self._lines() if not line["passed"])
-        return any(
-            line["champion"] == champion and line["generation"] <= generation for line in failures
-        )
+        return any(line["champion"] == champion for line in self._failures(generation))
+
+    def margin_that_failed(self, generation: int) -> float:
+        """Return the largest margin with which a certificate failed up to this generation."""
+        margins = (line.get("margin") for line in self._failures(generation))
+        return max((margin for margin in margins if margin is not None), default=-np.inf)
 
     def taken(self, generation: int) -> int:
         """Return the number of examinations up to this generation."""
@@ -57,12 +60,23 @@ class Exams:
         before = self._until(generation)
         return before.index(champion) + 1 if champion in before else len(before) + 1
 
-    def add(self, champion: str, generation: int, passed: bool) -> None:
-        """Record an examination, once for each champion."""
+    def add(
+        self, champion: str, generation: int, passed: bool, margin: float | None = None
+    ) -> None:
+        """Record an examination, once for each champion.
+
+        margin: on the draw to choose on, if the certificate failed.
+        """
         if champion in (line["champion"] for line in self._lines()):
             return
-        line = {"generation": generation, "champion": champion, "passed": passed}
+        line: Line = {"generation": generation, "champion": champion, "passed": passed}
+        if margin is not None and np.isfinite(margin):
+            line["margin"] = margin
         write_lines(self.path, [*self._lines(), line])
+
+    def _failures(self, generation: int) -> list[Line]:
+        lines = self._lines()
+        return [line for line in lines if not line["passed"] and line["generation"] <= generation]
 
     def _until(self, generation: int) -> list[str]:
         lines = sorted(self._lines(), key=lambda line: line["generation"])
@@ -145,13 +159,24 @@ class Examiner:
         if self.prescreen is None:
             ranks = ranks[:most]
         likely = [rank for rank in ranks if _promising(self.experiment, state, rank)]
-        wanted = enough(config, generation)
+        wanted = self._wanted(generation)
         able = [rank for rank, margin in self._in_order(state, likely) if margin >= wanted]
         for rank in able[:most]:
             champion = self.experiment.champion(state, self.versions, rank)
             if examined := self._on_the_way(champion, generation):
                 return examined
         return None
+
+    def _wanted(self, generation: int) -> float:
+        """Return the margin required for an examination during the run.
+
+        It is `examination.enough` in the first half of the generations and 0 in the second, and
+        always more than a margin with which a certificate has failed.
+        """
+        config = self.experiment.config
+        early = 2 * generation <= config.evolution.generations
+        failed = self.exams.margin_that_failed(generation)
+        return max(config.examination.enough if early else 0.0, float(np.nextafter(failed, np.inf)))
 
     def _in_order(self, state: EvolutionState, ranks: list[int]) -> list[tuple[int, float]]:
         """Return the individuals, each with its margin by pre-screening, best first.
@@ -167,7 +192,7 @@ class Examiner:
     def _on_the_way(self, champion: Champion, generation: int) -> Examined | None:
         """Return a champion with its certificate, if it passes; never validate it twice."""
         config, name = self.experiment.config, champion.fingerprint
-        wanted = enough(config, generation)
+        wanted = self._wanted(generation)
         if self._margins.get(name, np.inf) < wanted or self.exams.failed(name, generation):
             return None
         if self.exams.attempt(name, generation) >= config.examination.attempts:
@@ -253,16 +278,9 @@ class Examiner:
             self.tell("\n".join(beyond.rows()))
         examined = Examined(certificate, seen.champion, beyond)
         with disk_errors(self.exams.path.parent):
-            self.exams.add(name, generation, examined.passed)
+            margin = None if certificate.passed else seen.margin
+            self.exams.add(name, generation, examined.passed, margin)
         return examined
-
-
-def enough(config: Config, generation: int) -> float:
-    """Return the margin required for an examination during the run.
-
-    It is `examination.enough` in the first half of a run's generations, 0 in the second.
-    """
-    return config.examination.enough if 2 * generation <= config.evolution.generations else 0.0
 
 
 def due(settings: ExaminationConfig, generation: int) -> bool:

@@ -208,14 +208,17 @@ def test_any_certificate_that_passes_ends_the_run(experiment, looks, exams):
 
 def test_a_failed_champion_is_not_retried_and_the_next_is_attempt_two(experiment, looks, exams):
     looks.certificates = [-0.1, 0.3]
+    looks.glances, looks.rehearsals = [1.0], [0.3, 0.3, 0.4]
     assert examiner(experiment, exams).early(state_with(experiment, 3)) is None
     # A resumed run reads the failure from the file.
     assert examiner(experiment, exams).early(state_with(experiment, 6)) is None
     assert looks.requested.count("exam") == 1
     other = other_best(state_with(experiment, 6))
+    assert examiner(experiment, exams).early(other) is None, "no more margin than what failed"
     examined = examiner(experiment, exams).early(other)
     assert examined is not None
     assert examined.certificate.attempts == 2
+    assert looks.requested.count("exam") == 2
 
 
 def test_the_second_candidate_is_validated_where_the_first_fails(experiment, looks, exams):
@@ -527,7 +530,8 @@ def test_an_error_in_validation_ends_the_run(
 def test_a_run_that_never_passes_goes_on_to_the_end(
     tmp_path: Path, experiment: Experiment, promising: None, looks: Looks
 ):
-    looks.certificates = [-0.5]
+    looks.certificates, looks.rehearsals = [-0.5], [0.3, 0.4, 0.5]
+    looks.glances = [1.0]
     folder = tmp_path / "run"
     create_run(folder, experiment.creature, experiment.config)
     said = trained(folder, experiment)
