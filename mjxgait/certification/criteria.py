@@ -126,36 +126,34 @@ def pushes(share: float, config: CertificateConfig) -> Criterion:
 
 
 def physics(window: Recording, config: PhysicsConfig) -> Criterion:
+    """Criterion 8 of a body with hips, whose speed and penetration count in units of its size."""
+    size = window.dimensions
+    speed = window.body_speed.max() / np.sqrt(size.gravity * size.hip_height)
+    depth = window.penetration.max() / size.hip_height
+    return machine(
+        window,
+        config,
+        at_most("body speed / sqrt(g h)", speed, config.body_speed),
+        at_most("penetration / hip height", depth, config.penetration),
+    )
+
+
+def machine(window: Recording, config: PhysicsConfig, *own: Measure) -> Criterion:
     """Criterion 8: no physics exploit.
 
-    Speeds, joint angles, penetration and torques must be those of a machine that could exist.
+    Speeds, joint angles and torques must be those of a machine that could exist. own: measures of
+    bodies of this kind.
     """
-    size = window.dimensions
+    fastest, overrun = np.abs(window.joint_vel).max(), joint_overrun(window).max()
+    torque = float((np.abs(window.torque) / window.dimensions.torque_limit).max())
     return Criterion(
         8,
         "physics",
         (
-            at_most("joint speed (rad/s)", np.abs(window.joint_vel).max(), config.joint_speed),
-            at_most(
-                "joint past its range (rad)", joint_overrun(window).max(), config.joint_overrun
-            ),
-            at_most(
-                "body speed / sqrt(g h)",
-                window.body_speed.max() / np.sqrt(size.gravity * size.hip_height),
-                config.body_speed,
-            ),
-            at_most(
-                "penetration / hip height",
-                window.penetration.max() / size.hip_height,
-                config.penetration,
-            ),
-            Measure(
-                "torque / limit",
-                float((np.abs(window.torque) / size.torque_limit).max()),
-                "<=",
-                config.torque,
-                0.0,
-            ),
+            at_most("joint speed (rad/s)", fastest, config.joint_speed),
+            at_most("joint past its range (rad)", overrun, config.joint_overrun),
+            *own,
+            Measure("torque / limit", torque, "<=", config.torque, 0.0),
         ),
     )
 

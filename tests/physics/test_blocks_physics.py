@@ -19,7 +19,8 @@ from mjxgait.controllers.sims_brain.reference_files import body_xml
 from mjxgait.creature.geometry import DOWN, geom_reach, lowest
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Surroundings
-from mjxgait.tasks.modular.follow import Following
+from mjxgait.tasks.modular.follow import Following, Light
+from mjxgait.tasks.starts import NEVER
 from mjxgait.types import BodyState
 
 ON_LAND = Surroundings(contact=0.01, iterations=20, line_iterations=20, lit=True)
@@ -231,7 +232,8 @@ def test_light_direction_is_in_each_blocks_own_axes(graphs: Graph, bodies: Body)
     state, place = moments(bodies, 0.3), np.array([3.0, -4.0, 1.0])
     sensed, _ = looked_at(state)
     unused: Any = None
-    look = jax.vmap(partial(Following.observations, unused, jnp.float32(place)), in_axes=-1)
+    light = Light(jnp.float32(place), jnp.zeros(3), jnp.array(NEVER))
+    look = jax.vmap(partial(Following.observations, unused, light), in_axes=-1)
     seen = np.asarray(jax.jit(look)(sensed)["light"])
     for lane in range(LANES):
         body = one(bodies, lane)
