@@ -180,8 +180,9 @@ def added_in(cls: type, prefix: str = "") -> frozenset[str]:
     for name, hint in get_type_hints(cls, include_extras=True).items():
         if ADDED in getattr(hint, "__metadata__", ()):
             found.add(prefix + name)
-        elif dataclasses.is_dataclass(hint) and isinstance(hint, type):
-            found |= added_in(hint, f"{prefix}{name}.")
+        inner = getattr(hint, "__origin__", hint)
+        if dataclasses.is_dataclass(inner) and isinstance(inner, type):
+            found |= added_in(inner, f"{prefix}{name}.")
     return frozenset(found)
 
 

@@ -213,6 +213,20 @@ def test_stored_settings_are_whole_or_refused(stool: Creature, tmp_path: Path):
             open_run(run)
 
 
+def test_stored_settings_of_earlier_checkouts_lack_keys_that_were_added(
+    stool: Creature, tmp_path: Path
+):
+    """Also keys within a table that was added."""
+    run = write_run(tmp_path / "run", stool)
+    table = tomllib.loads((run / CONFIG).read_text())
+    added = [p for p in places(table) if ".".join(map(str, p)) in added_in(Config)]
+    assert ("evolution", "ancestors", "starts") in added
+    assert ("evolution", "ancestors") in added
+    for place in added:
+        (run / CONFIG).write_text(tomli_w.dumps(changed(table, place, GONE)))
+        assert open_run(run)[1] == Config()
+
+
 def test_a_full_disk_keeps_the_old_certificate(
     stool: Creature, tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch
 ):
