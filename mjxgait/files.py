@@ -114,6 +114,17 @@ def check_tree(value: object) -> None:
     raise ValueError(f"nested deeper than {MOST_DEPTH}")
 
 
+def path_of(place: str | os.PathLike[str]) -> Path:
+    """Return the path of a file or folder that a user names.
+
+    Raises:
+      UserError: it is neither text nor a path.
+    """
+    if isinstance(place, str | os.PathLike):
+        return Path(place)
+    raise UserError(f"{place!r}: name a file or a folder, as text or as a path")
+
+
 @contextlib.contextmanager
 def writing(place: Path) -> Iterator[None]:
     """Raise a UserError for an error of the system in the block, which writes a file or a folder.

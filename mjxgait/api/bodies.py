@@ -8,7 +8,7 @@ from mjxgait.api.run import Place
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.files import writing
+from mjxgait.files import path_of, writing
 from mjxgait.importer import TOML, WRITTEN, ImportChoices, Imported
 from mjxgait.importer import import_model as read_model
 from mjxgait.training.folder import write_creature
@@ -48,7 +48,7 @@ def import_model(
     Raises:
       UserError: the file cannot be used, or the folder not be written, with the reason.
     """
-    file, folder, places = Path(model), Path(out), tuple(map(Path, search))
+    file, folder, places = path_of(model), path_of(out), tuple(map(path_of, search))
     choices = ImportChoices(name, places, tuple(keep), tuple(freeze), up, forward, height)
     imported = into_folder(file, folder, choices, force)
     tell(imported.notes.text())

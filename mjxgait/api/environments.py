@@ -2,13 +2,13 @@
 
 import dataclasses
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mjxgait.api.make import load_creature, used
 from mjxgait.api.run import Place
 from mjxgait.config.tables import Table, build, merge
 from mjxgait.creature import Creature
+from mjxgait.files import path_of
 
 if TYPE_CHECKING:  # they lead to JAX
     from mjxgait.environments.functional import Environment
@@ -58,7 +58,7 @@ def problem_of(
 
     use = used(task=task)
     body = creature if isinstance(creature, Creature) else load_creature(creature)
-    resolved = configured(body, Path(config) if config else None, use, WalkTargets())
+    resolved = configured(body, path_of(config) if config else None, use, WalkTargets())
     table = merge(dataclasses.asdict(resolved), settings or {})
     chosen = build(type(resolved), table, "the settings of the environment")
     return make_problem(body, chosen, tuple(observe), perturbed)

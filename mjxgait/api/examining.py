@@ -1,7 +1,5 @@
 """Champions examined, and their motion as numbers."""
 
-from pathlib import Path
-
 import numpy as np
 
 from mjxgait import certification
@@ -12,7 +10,7 @@ from mjxgait.certification.validity import differences
 from mjxgait.config.tables import build, read_toml
 from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
-from mjxgait.files import write_text
+from mjxgait.files import path_of, write_text
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.examination import Exams
 from mjxgait.training.folder import CERTIFICATE, EXAMS, command
@@ -43,7 +41,7 @@ def examine(run: Run | Place, config: Place | None = None) -> Certificate:
       UserError: no run, no champion, or an invalid file.
     """
     known = opened(run)
-    table = read_toml(Path(config)) if config else {}
+    table = read_toml(path_of(config)) if config else {}
     champion = known.champion
     attempt = Exams(known.folder / EXAMS).attempt(
         champion.fingerprint, int(champion.origin.get("generation", 0))
@@ -91,7 +89,7 @@ def examine_expressions(
     from mjxgait.plugins.fit import check_fit
     from mjxgait.tasks.walk.targets import WalkTargets, configured
 
-    table = read_toml(Path(config)) if config else {}
+    table = read_toml(path_of(config)) if config else {}
     thresholds = build(CertificateConfig, table, str(config))
     use = {"controller": "program"} | ({"task": task} if task else {})
     creature = load_creature(env)
@@ -99,7 +97,7 @@ def examine_expressions(
     check_fit(creature, settings)
     creature = at_step(creature, settings.rollout.step).on(settings.rollout.ground)
     return certification.certify(
-        creature, written_champion(creature, settings, Path(file)), thresholds
+        creature, written_champion(creature, settings, path_of(file)), thresholds
     )
 
 

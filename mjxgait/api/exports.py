@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 from mjxgait.api.run import Place, Run
 from mjxgait.errors import UserError
-from mjxgait.training.disk import require_writable
+from mjxgait.files import path_of
+from mjxgait.training.folder import require_output
 
 if TYPE_CHECKING:
     from mjxgait.animation.export import Character, WalkLoop
@@ -45,10 +46,10 @@ def export(
     from mjxgait.rendering.video import LOOP_SECONDS, champion_of
     from mjxgait.rendering.walk import doubt
 
-    folder, file = folder_of(run), Path(out)
-    over = None if onto is None else Path(onto)
+    folder, file = folder_of(run), path_of(out)
+    over = None if onto is None else path_of(onto)
     _check_names(file, over)
-    require_writable(file)
+    require_output(file)
     character = None if over is None else read_character(over)
     walk = champion_of(folder, LOOP_SECONDS).walk
     said = (
@@ -84,15 +85,15 @@ def share(
     Raises:
       UserError: no champion, a wrong ending, no WebAssembly build, or the file cannot be written.
     """
-    folder, file = folder_of(run), Path(out)
+    folder, file = folder_of(run), path_of(out)
     if file.suffix.lower() not in PAGES:
         raise UserError(f'{file}: cannot write "{file.suffix}"; end the name with .html')
     if wasm and not physics:
         raise UserError(
             "--wasm names what --physics puts into the page; add --physics, or leave it out"
         )
-    require_writable(file)
-    doubts = _write_page(folder, file, physics, Path(wasm) if wasm else None)
+    require_output(file)
+    doubts = _write_page(folder, file, physics, path_of(wasm) if wasm else None)
     tell(sized(file))
     if doubts:
         tell(doubts)
@@ -128,7 +129,7 @@ def plot(
     """
     from mjxgait.rendering.plots import plot_run
 
-    return plot_run(folder_of(run), None if out is None else Path(out), formats)
+    return plot_run(folder_of(run), None if out is None else path_of(out), formats)
 
 
 def sized(file: Path) -> str:
@@ -138,7 +139,7 @@ def sized(file: Path) -> str:
 
 def folder_of(run: Run | Place) -> Path:
     """Return the folder of a run."""
-    return run.folder if isinstance(run, Run) else Path(run)
+    return run.folder if isinstance(run, Run) else path_of(run)
 
 
 def _numbers(walk: "Walk", out: Path) -> str:

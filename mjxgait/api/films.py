@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from mjxgait.api.exports import Tell, folder_of, sized
 from mjxgait.api.run import Place, Run
 from mjxgait.errors import UserError
-from mjxgait.files import replaced, writing
+from mjxgait.files import path_of, replaced, writing
 
 if TYPE_CHECKING:
     from mjxgait.rendering.stage import Stage
@@ -77,7 +77,7 @@ def render(
     several = [run] if isinstance(run, Run | str | Path) else run
     film = Film(
         runs=tuple(map(folder_of, several)),
-        out=Path(out),
+        out=path_of(out),
         top=top,
         generations=",".join(map(str, generations)) if generations else None,
         seconds=seconds,

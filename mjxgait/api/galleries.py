@@ -8,8 +8,8 @@ from mjxgait.api.exports import PAGES, Tell, folder_of, sized
 from mjxgait.api.run import Place, Run
 from mjxgait.api.studies import STUDY, champions_of_study
 from mjxgait.errors import UserError
-from mjxgait.training.disk import require_writable
-from mjxgait.training.folder import CHAMPION, CONFIG
+from mjxgait.files import path_of
+from mjxgait.training.folder import CHAMPION, CONFIG, require_output
 
 if TYPE_CHECKING:
     from mjxgait.champion import Champion
@@ -48,8 +48,8 @@ def gallery(
     Raises:
       UserError: no champion, too many, a wrong ending, or a file cannot be written.
     """
-    page, still = Path(out), None if poster is None else Path(poster)
-    film = None if video is None else Path(video)
+    page, still = path_of(out), None if poster is None else path_of(poster)
+    film = None if video is None else path_of(video)
     check_files(page, still, film)
     several = [runs] if isinstance(runs, Run | str | Path) else runs
     shown = entries_of(map(folder_of, several), tell)
@@ -76,14 +76,14 @@ def check_files(page: Path | None, poster: Path | None, video: Path | None) -> N
     if page is not None:
         if page.suffix.lower() not in PAGES:
             raise UserError(f'{page}: cannot write "{page.suffix}"; end the name with .html')
-        require_writable(page)
+        require_output(page)
     if poster is not None:
         if poster.suffix.lower() not in STILLS:
             endings = ", ".join(STILLS)
             raise UserError(
                 f'{poster}: cannot write "{poster.suffix}"; end the name with {endings}'
             )
-        require_writable(poster)
+        require_output(poster)
     if video is not None:
         from mjxgait.rendering.video import require_writer
 

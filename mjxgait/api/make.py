@@ -16,6 +16,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
 from mjxgait.creature.scale import at_step, facing, load_files, scaled
 from mjxgait.errors import UserError
+from mjxgait.files import path_of
 from mjxgait.training.folder import Line, check_run, create_run
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def load_creature(
     """
     from mjxgait.importer import import_model, robot_name
 
-    path = Path(env)
+    path = path_of(env)
     if not path.is_file() and robot_name(env) is None:
         creature = load_folder(find_creature(str(env)))
     else:
@@ -126,16 +127,16 @@ def train(
         "style": style,
         "certificate": certificate,
     }
-    file = Path(config) if config else None
+    file = path_of(config) if config else None
     resolved = configured(creature, file, use, WalkTargets.of(requested))
     evolution = not_none(population=population, generations=generations)
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
     chosen = build(type(resolved), merge(table, settings or {}), "the settings given to train")
     creature = at_step(creature, chosen.rollout.step)
     if expressions is not None:
-        chosen = with_expressions(creature, chosen, Path(expressions))
-    initial = Path(source) if source else None
-    for folder, one in attempts(Path(out) if out else None, creature, chosen, tries):
+        chosen = with_expressions(creature, chosen, path_of(expressions))
+    initial = path_of(source) if source else None
+    for folder, one in attempts(path_of(out) if out else None, creature, chosen, tries):
         begin = partial(create_run, folder, creature, one)
         run = _evolved(folder, creature, one, quiet, begin, initial, on_generation)
         if run.certified:
@@ -213,15 +214,15 @@ def refine(
     from mjxgait.animation.keys import bring
     from mjxgait.animation.keys import refine as near
 
-    creature, source = load_creature(env), Path(keys)
+    creature, source = load_creature(env), path_of(keys)
     base = near.base_settings(
-        creature, Path(config) if config else None, seed, population, generations, settings
+        creature, path_of(config) if config else None, seed, population, generations, settings
     )
-    table = read_toml(Path(names)) if isinstance(names, str | Path) else names
+    table = read_toml(path_of(names)) if isinstance(names, str | Path) else names
     tell: Callable[[str], object] = (lambda said: None) if quiet else print
     brought = bring(creature, source, table, (begin, end), np.radians(tolerance), forward, tell)
     chosen = near.refining(creature, base, brought, keep)
-    folder = check_run(Path(out) if out else None, creature, chosen)
+    folder = check_run(path_of(out) if out else None, creature, chosen)
     begins = partial(near.begin, folder, creature, chosen, source, brought)
     return _evolved(folder, creature, chosen, quiet, begins, on_generation=on_generation)
 

@@ -17,7 +17,7 @@ from mjxgait.config.tables import build, merge, not_none
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
-from mjxgait.files import replaced, write_text
+from mjxgait.files import path_of, replaced, write_text
 from mjxgait.output import Output
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import WalkTargets, speed_of, with_targets
@@ -137,13 +137,13 @@ def repertoire(
         gait=gait,
         style=None if style is None else str(style),
         config=str(config),
-        out=None if out is None else Path(out),
+        out=None if out is None else path_of(out),
         population=population,
         generations=generations,
         seed=seed,
         rate=rate,
         travelling=travelling,
-        onto=None if onto is None else Path(onto),
+        onto=None if onto is None else path_of(onto),
         blends=blends,
     )
     folder, ended = gather(request, Output(Console(quiet=True) if quiet else None))

@@ -15,6 +15,7 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.extras import install_command
+from mjxgait.files import path_of
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
@@ -160,6 +161,6 @@ def open(folder: Place) -> Run:
     Raises:
       UserError: not a run folder.
     """
-    run = Run(Path(folder))
+    run = Run(path_of(folder))
     open_run(run.folder)
     return run

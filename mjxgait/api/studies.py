@@ -1,6 +1,7 @@
 """A study: variants of the settings compared over seeds, with error bars."""
 
 import dataclasses
+import math
 import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -22,7 +23,7 @@ from mjxgait.config.tables import (
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
-from mjxgait.files import write_text, writing
+from mjxgait.files import path_of, write_text, writing
 from mjxgait.output import Output, duration
 from mjxgait.training.folder import CREATURE, check_free, write_creature
 from mjxgait.training.lock import locked
@@ -112,8 +113,8 @@ def ablate(
       UserError: an invalid argument, explained in one sentence.
     """
     request = AblateRequest(
-        study=Path(study),
-        out=None if out is None else Path(out),
+        study=path_of(study),
+        out=None if out is None else path_of(out),
         env=env,
         seeds=seeds,
         first_seed=first_seed,
@@ -154,6 +155,8 @@ def prepared(options: AblateRequest) -> Prepared:
     """
     from mjxgait.experiments.ablation.plan import check_variants, make_plan
 
+    if not options.hours > 0:
+        raise UserError(f"--hours {options.hours:g}: must be above zero")
     name = options.study.stem if options.study else ""
     folder = options.resume or options.out or Path("runs") / f"ablate-{name}"
     study, creature = _open(folder) if options.resume else _read(options)
@@ -177,7 +180,7 @@ def prepared(options: AblateRequest) -> Prepared:
     if hours > options.hours:
         raise UserError(
             f"this study may take {hours:.0f} hours; take fewer --seeds or --generations, or allow "
-            f"it with --hours {hours:.0f}"
+            f"it with --hours {math.ceil(hours)}"
         )
     return Prepared(folder, study, creature, plan, parts, words)
 

@@ -17,6 +17,7 @@ from mjxgait.config.tables import (
     Fraction,
     NonNegative,
     Positive,
+    Seed,
     Share,
     Whole,
 )
@@ -214,7 +215,7 @@ class Config:
     """
 
     __pydantic_config__ = STRICT
-    seed: Annotated[Whole, HOST] = 0
+    seed: Annotated[Seed, HOST] = 0
     checkpoint_every: Annotated[Count, HOST] = 5
     keep_every: Annotated[Count, HOST] = 5
     use: UseConfig = dataclasses.field(default_factory=UseConfig)

@@ -31,6 +31,8 @@ Share = Annotated[float, pydantic.Field(gt=0, le=1)]
 Finite = Annotated[float, pydantic.Field(allow_inf_nan=False)]
 Count = Annotated[int, pydantic.Field(ge=1)]
 Whole = Annotated[int, pydantic.Field(ge=0)]
+Seed = Annotated[int, pydantic.Field(ge=0, lt=2**32)]
+"""Random numbers are of 32 bits: seeds that differ by 2^32 would be the same run."""
 
 
 def _ordered(interval: tuple[float, float]) -> tuple[float, float]:

@@ -35,6 +35,8 @@ from mjxgait.tasks.walk.gaits import stations_of
 NOT_ALONE = re.compile(
     r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
 )
+HEAVIEST = 1e6
+"""Limit of a body's mass in kg and of its moments of inertia in kg·m²."""
 MOST_TEXT = 8_000_000
 """Largest size of a file in bytes."""
 
@@ -78,6 +80,7 @@ def _assemble(
     for key, parts in (("rig.bones", settings.rig.bones), ("rig.turned", settings.rig.turned)):
         for part in parts:
             _id(model, mujoco.mjtObj.mjOBJ_BODY, part, key)
+    _check_numbers(model)
     check_world(model, trunk, _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor"))
     data = _standing(model, settings.creature.keyframe)
     axes = _trunk_axes(data.xmat[trunk].reshape(3, 3), np.array(settings.creature.forward))
@@ -286,6 +289,8 @@ def _foot_bodies(model: mujoco.MjModel, settings: CreatureSettings) -> tuple[lis
     names = settings.creature.feet
     if not names:
         raise UserError("creature.feet is empty; name the geoms that step on the floor")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise UserError(f'creature.feet names "{twice[0]}" twice; leave one out')
     geoms = [_id(model, mujoco.mjtObj.mjOBJ_GEOM, name, "creature.feet") for name in names]
     body_of = {g: _foot_body(model, settings, g) for g in geoms}
     bodies = list(dict.fromkeys(body_of.values()))
@@ -316,6 +321,21 @@ def _check_plane(creature: Creature, data: mujoco.MjData) -> None:
                 f'creature.planar: joint "{name}" turns about another axis than "{names[0]}", so this '
                 "is no body in a plane; leave `planar` out"
             )
+
+
+def _check_numbers(model: mujoco.MjModel) -> None:
+    """Refuse a time step or masses with which nothing can be simulated; MuJoCo accepts them."""
+    if not 0 < (step := model.opt.timestep) < np.inf:
+        raise UserError(
+            f"creature.xml: option.timestep = {step:g} s; it must be above zero, such as 0.005"
+        )
+    for body in range(1, model.nbody):
+        for what, values in (("mass", model.body_mass), ("inertia", model.body_inertia)):
+            if not (np.abs(values[body]) < HEAVIEST).all():
+                raise UserError(
+                    f'creature.xml: body "{model.body(body).name}" has a {what} of '
+                    f"{np.max(values[body]):g}; give it less than {HEAVIEST:g}"
+                )
 
 
 def _check(creature: Creature, data: mujoco.MjData) -> None:

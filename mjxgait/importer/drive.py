@@ -11,7 +11,7 @@ import numpy as np
 
 from mjxgait.errors import listed
 from mjxgait.importer.body import KinematicModel
-from mjxgait.importer.notes import Notes
+from mjxgait.importer.notes import Confidence, Notes
 from mjxgait.importer.soles import Stance, lowest_part
 from mjxgait.importer.stance import stance_of
 
@@ -134,9 +134,7 @@ def plan_drive(
     reason += f", and {stronger:g} times as much, because it sank" if stronger > 1 else ""
     reason += "; more where a joint's own inertia needs it" if (kp == quick).any() else ""
     notes.guess("kp, kd", f"{np.median(kp):.3g}, {np.median(kd):.3g}", "medium", reason)
-    used = np.isfinite(stated) & (torque == stated)
-    notes.guess("torque_limit", f"{torque.min():.3g} to {torque.max():.3g}", "high" if used.all() else "medium",
-                f"stated for {used.sum()} of {len(q)} joints; else from weight times hip height")  # fmt: skip
+    _tell_torque(torque, stated, notes)
     notes.guess(
         "range", "by what each joint does", "low", "40 degrees and less, within the file's limits"
     )
@@ -287,6 +285,18 @@ def _bend_one_way(kinematics: KinematicModel, q: np.ndarray, drive: Drive, notes
             "medium",
             f"the file has no limits for {listed(sided)}: no further than straight",
         )
+
+
+def _tell_torque(torque: np.ndarray, stated: np.ndarray, notes: Notes) -> None:
+    """Note the torque limits [J], and what became of those that the file states, else infinite."""
+    known, used = np.isfinite(stated), torque == stated
+    cut, raised = known & (torque < stated), known & (torque > stated)
+    said = [f"stated for {known.sum()} of {len(torque)} joints"]
+    said += [f"cut for {cut.sum()} to three times what walking needs"] if cut.any() else []
+    said += [f"too little for {raised.sum()}"] if raised.any() else []
+    said += ["else from weight times hip height"] if raised.any() or not known.all() else []
+    sure: Confidence = "high" if used.all() else "medium"
+    notes.guess("torque_limit", f"{torque.min():.3g} to {torque.max():.3g}", sure, "; ".join(said))
 
 
 def _steering(kinematics: KinematicModel, stance: Stance, drive: Drive) -> None:

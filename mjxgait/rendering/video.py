@@ -16,8 +16,7 @@ from mjxgait.rendering.floor import DARK_INK, font
 from mjxgait.rendering.gl import gl_pictures
 from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.walk import Walk, record_walk
-from mjxgait.training.disk import require_writable
-from mjxgait.training.folder import open_champion
+from mjxgait.training.folder import open_champion, require_output
 
 FORMATS = (".webp", ".gif", ".mp4", ".png")
 PAPER = (255, 255, 255, 200)
@@ -128,7 +127,7 @@ def require_writer(path: Path) -> None:
         )
     if path.suffix.lower() == ".mp4":
         _import_av(path)
-    require_writable(path)
+    require_output(path)
 
 
 def _write_webp(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:

@@ -36,7 +36,7 @@ from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, read_text, write_te
 from mjxgait.plugins import build_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.user_code import KINDS, places_of
-from mjxgait.training.disk import disk_errors
+from mjxgait.training.disk import disk_errors, require_writable
 
 CONFIG, OWN = "config.toml", "own.toml"
 """Files in a run folder: settings; and FILE.py:CLASS of a user-defined controller or task."""
@@ -125,6 +125,21 @@ PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
 MOTHERS = "mothers"
 """Key in a log line: each individual's own place in the previous generation, or its mother's."""
 ISLANDS, MIGRATIONS, ANCESTORS = "islands", "migrations.jsonl", "ancestors"
+
+
+RUN_FILES = (CONFIG, OWN, METRICS, CHAMPION, CERTIFICATE, STRESS, EXAMS, PLOT, MIGRATIONS)
+"""Files that a run writes and reads again."""
+
+
+def require_output(path: Path) -> None:
+    """Check before long work that a file may be written, and is none of a run's own.
+
+    Raises:
+      UserError: names the file, or the folder that is missing.
+    """
+    if path.name in RUN_FILES and (path.absolute().parent / CONFIG).is_file():
+        raise UserError(f"{path}: the run's own file; name another one")
+    require_writable(path)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from mjxgait.config.tables import Index, Text, check
 from mjxgait.errors import UserError
 from mjxgait.files import read_json
+from mjxgait.training.folder import command
 from mjxgait.training.lock import why_empty
 
 SCHEMA = 2
@@ -90,10 +91,11 @@ def read_stored(run: Path, digest: str, generation: int | None = None) -> Stored
     except _Damaged as damage:
         others = (known for known in reversed(known) if known != wanted)
         intact = next((other for other in others if _intact(run, other, digest)), None)
+        resume = command("train", "--resume", run, run=run)
         way_out = (
             "no other one is intact"
             if intact is None
-            else f"generation {intact} is intact: add --generation {intact}"
+            else f"generation {intact} is intact: `{resume} --generation {intact}` goes on from it"
         )
         raise UserError(f"{folder}: the checkpoint is damaged ({damage}); {way_out}") from None
 

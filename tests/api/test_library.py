@@ -167,8 +167,15 @@ def test_nothing_is_overwritten(run: mjxgait.Run):
         (lambda: mjxgait.refine(STOOL, "no.fbx"), "Blender"),
         (lambda: mjxgait.open("nowhere"), "not a run folder"),
         (lambda: mjxgait.walk("nowhere"), "not a run folder"),
+        (lambda: mjxgait.open(5), "5: name a file or a folder"),
+        (lambda: mjxgait.train(STOOL, config={}, out=5), "5: name a file or a folder"),
+        (lambda: mjxgait.train(STOOL, config={"seed": 1}), "name a file or a folder"),
+        (lambda: mjxgait.train(STOOL, seed=2**32), "seed = 4294967296"),
     ],
-    ids=["creature", "key", "range", "controller", "keys", "kind", "folder", "walk"],
+    ids=[
+        *("creature", "key", "range", "controller", "keys", "kind", "folder", "walk"),
+        *("number", "out", "config", "seed"),
+    ],
 )
 def test_a_mistake_is_one_sentence(call, words: str, tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -11,6 +11,7 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.importer import Imported
 from mjxgait.importer.notes import Notes
+from mjxgait.training.folder import require_output
 
 STUDY = f"""
 question = "?"
@@ -76,6 +77,45 @@ def test_an_unsupported_body_is_refused_first(
     out = tmp_path / "out"
     assert "no such thing" in said_by(capsys, *arguments, "--out", out, code=2)
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--task", "follow", "--controller", "poses"), "its body grows with its brain, so poses"),
+        (("--task", "follow", "--evolution.ancestors.population", 1), "ancestors.population = 1"),
+        (("--seed", 2**70), "seed = 1180591620717411303424"),
+    ],
+    ids=["controller", "ancestors", "seed"],
+)
+def test_settings_that_evolving_bodies_cannot_have_are_refused_first(
+    options: tuple[object, ...], words: str, tmp_path: Path, capsys
+):
+    out = tmp_path / "out"
+    assert words in said_by(capsys, "train", "blocks", *options, "--out", out, code=2)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("hours", ["0", "nan", "-1"])
+def test_a_study_needs_time(hours: str, tmp_path: Path, capsys):
+    (tmp_path / "study.toml").write_text(STUDY)
+    out = tmp_path / "out"
+    study = tmp_path / "study.toml"
+    said = said_by(capsys, "ablate", study, "--hours", hours, "--out", out, code=2)
+    assert f"--hours {hours}: must be above zero" in said
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["champion.json", "certificate.json", "config.toml", "fitness.png"]
+)
+def test_a_runs_own_files_are_no_output(name: str, tmp_path: Path):
+    (tmp_path / "config.toml").touch()
+    with pytest.raises(UserError, match="the run's own file"):
+        require_output(tmp_path / name)
+    require_output(tmp_path / "walk.json")
+    (tmp_path / "other").mkdir()
+    require_output(tmp_path / "other" / name)
 
 
 def test_a_checkpoint_of_a_new_run_is_refused_first(tmp_path: Path, capsys):

@@ -15,6 +15,9 @@ from mjxgait.errors import UserError
 SIDES = ("left", "right")
 
 
+INERTIAL = '<inertial pos="0 0 0" mass="{}" diaginertia="1 1 1"/><freejoint'
+
+
 def edited(tmp_path: Path, file: str, old: str, new: str) -> Path:
     folder = tmp_path / "stool"
     shutil.copytree(STOOL, folder)
@@ -192,6 +195,27 @@ def test_a_capsule_reaches_its_radius_beyond_its_ends():
             'name="floor"',
             'name="ground"',
             'the floor = "floor" is not in creature.xml',
+        ),
+        (
+            "creature.toml",
+            '"front_left_foot", ',
+            '"front_left_foot", "front_left_foot", ',
+            'names "front_left_foot" twice',
+        ),
+        ("creature.xml", 'timestep="0.005"', 'timestep="0"', "option.timestep = 0 s"),
+        ("creature.xml", 'timestep="0.005"', 'timestep="nan"', "option.timestep = nan s"),
+        ("creature.xml", 'timestep="0.005"', 'timestep="-1"', "option.timestep = -1 s"),
+        (
+            "creature.xml",
+            "<freejoint",
+            INERTIAL.format("inf"),
+            'body "trunk" has a mass of inf',
+        ),
+        (
+            "creature.xml",
+            "<freejoint",
+            INERTIAL.format("1e30"),
+            "give it less than 1e+06",
         ),
         ("creature.xml", "</worldbody>", "</worldbod>", "not a model that MuJoCo can load"),
         ("creature.xml", 'type="capsule"', 'type="capsul"', "not a model that MuJoCo can load"),

@@ -373,3 +373,19 @@ def test_train_takes_a_model_file(tmp_path):
     model.write_text(QUADRUPED)
     creature, _ = _layers(["--env", str(model)])
     assert creature.name == "robot"
+
+
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        ("40", "stated for 8 of 8 joints"),
+        ("9000", "stated for 8 of 8 joints; cut for 8 to three times what walking needs"),
+        ("3", "stated for 8 of 8 joints; too little for 8; else from weight times hip height"),
+    ],
+)
+def test_the_report_says_what_became_of_stated_torques(stated: str, said: str, tmp_path: Path):
+    file = tmp_path / "biped.urdf"
+    file.write_text(BIPED.replace('effort="40"', f'effort="{stated}"'), encoding="utf-8")
+    notes = import_model(file, ImportChoices(apart=False)).notes.text()
+    line = next(line for line in notes.splitlines() if "torque_limit" in line)
+    assert said in line

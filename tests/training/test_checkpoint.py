@@ -95,8 +95,8 @@ def test_a_damaged_checkpoint_is_refused_and_the_newest_intact_one_offered(run: 
     corrupt(run, 5)
     with pytest.raises(
         UserError,
-        match=r"checkpoints/6: the checkpoint is damaged .*generation 4 is intact: add "
-        r"--generation 4",
+        match=r"checkpoints/6: the checkpoint is damaged .*generation 4 is intact: `mjxgait train "
+        r"--resume .* --generation 4`",
     ):
         restore(run, evolution)
 

@@ -16,6 +16,7 @@ from mjxgait.config.tables import (
     STRICT,
     Count,
     Finite,
+    Seed,
     Table,
     Whole,
     build,
@@ -80,7 +81,7 @@ class Study:
     env: str = "tall_quadruped"
     config: str | None = None
     seeds: Annotated[int, pydantic.Field(ge=2)] = 16
-    first_seed: Whole = 0
+    first_seed: Seed = 0
     generations: Count = 30
     measure: Measure = "walk"
     threshold: Finite | None = None
