@@ -74,7 +74,12 @@ def train(arguments: Sequence[str]) -> int:
         return _until_certified(options, creature, config)
     _check_resumed(options, config, default)
     from mjxgait.training.ended import nothing_left  # leads to JAX
+    from mjxgait.training.initial import has_begun
 
+    if options.generation is not None and not has_begun(options.resume):
+        raise UserError(
+            f"{options.resume}: it has no checkpoint yet, of any generation; leave --generation out"
+        )
     over = options.generation is None and nothing_left(options.resume, creature, config, default)
     if over:
         print(over)

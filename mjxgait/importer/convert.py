@@ -119,6 +119,9 @@ def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
 
 
 def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
+    for folder in choices.search:
+        if not folder.is_dir():
+            raise UserError(f"--search {folder}: no such folder")
     source = source_of(path, choices.search, choices.up, choices.height, notes)
     model = _compiled(source, choices, notes)
     up = source.up.value if source.up else choices.up

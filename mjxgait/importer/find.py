@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.geometry import ancestors, posed, subtree
-from mjxgait.errors import UserError, listed
+from mjxgait.errors import UserError, did_you_mean, listed
 from mjxgait.importer.anatomy import (
     HINGE,
     SLIDE,
@@ -61,6 +61,7 @@ def find_anatomy(
     shapes = {b: shapes_of(spec, spec.bodies[i + 1], i) for i, b in enumerate(bodies)}
     anatomy = measured(model, qpos, axis, scale, spec, shapes)
     tell_root_joints(model, root, notes)
+    _check_patterns(model, keep, freeze)
     movable = movable_joints(model, anatomy, coupled, freeze, notes)
     try:
         anatomy.feet = find_feet(model, anatomy, movable, limbs)
@@ -107,6 +108,18 @@ def _check_size(model: mujoco.MjModel) -> None:
             "the model has numbers that are infinite, not a number or absurdly large; correct them "
             "in the file"
         )
+
+
+def _check_patterns(model: mujoco.MjModel, keep: Sequence[str], freeze: Sequence[str]) -> None:
+    """Refuse a pattern that matches no joint: it would do nothing, without a word."""
+    names = [model.joint(j).name for j in range(model.njnt)]
+    for option, patterns in (("--keep", keep), ("--freeze", freeze)):
+        for pattern in patterns:
+            if not fnmatch.filter(names, pattern):
+                raise UserError(
+                    f"{option} {pattern}: no joint of the file has such a name; "
+                    f"{did_you_mean(pattern, names)}"
+                )
 
 
 def _choose_joints(

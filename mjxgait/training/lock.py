@@ -75,7 +75,10 @@ def why_empty(run: Path) -> str:
     """Return why a run has no results yet."""
     if writer := running(run):
         return f"it runs now ({writer}) and has not done its first generation"
-    return "the run ended before its first generation was done"
+    return (
+        "the run ended before its first generation was done; `mjxgait train --resume "
+        f"{run}` goes on with it"
+    )
 
 
 def _acquired(folder: Path) -> BinaryIO:

@@ -1,5 +1,6 @@
 """Importing small animals with the faults of real files: repaired, found or refused."""
 
+import dataclasses
 import os
 import re
 import shutil
@@ -389,3 +390,20 @@ def test_the_report_says_what_became_of_stated_torques(stated: str, said: str, t
     notes = import_model(file, ImportChoices(apart=False)).notes.text()
     line = next(line for line in notes.splitlines() if "torque_limit" in line)
     assert said in line
+
+
+@pytest.mark.parametrize(
+    ("choices", "said"),
+    [
+        (ImportChoices(keep=("zzz",)), "--keep zzz: no joint of the file has such a name"),
+        (ImportChoices(freeze=("left_hip_rol",)), 'did you mean "left_hip_roll"'),
+        (ImportChoices(search=(Path("nowhere"),)), "--search nowhere: no such folder"),
+    ],
+)
+def test_an_option_that_would_do_nothing_is_refused(
+    choices: ImportChoices, said: str, tmp_path: Path
+):
+    file = tmp_path / "biped.urdf"
+    file.write_text(BIPED, encoding="utf-8")
+    with pytest.raises(UserError, match=said):
+        import_model(file, dataclasses.replace(choices, apart=False))
