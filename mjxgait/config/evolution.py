@@ -108,14 +108,16 @@ class AncestorsConfig:
       generations: number of generations of each.
       initial_choice: genomes drawn and evaluated for each place of their first generation; 0: as
         many as for that task.
+      starts: R of each; 0: as many as for that task.
     """
 
     __pydantic_config__ = STRICT
     runs: Annotated[Whole, pydantic.AfterValidator(several), HOST] = 0
     task: Annotated[str, HOST] = "swim"
-    population: Annotated[Count, HOST] = 60
+    population: Annotated[int, pydantic.Field(ge=2), HOST] = 60
     generations: Annotated[Count, HOST] = 40
     initial_choice: Annotated[Whole, HOST, ADDED] = 0
+    starts: Annotated[Whole, HOST, ADDED] = 0
 
 
 @dataclasses.dataclass(frozen=True)

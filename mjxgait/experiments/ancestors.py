@@ -109,7 +109,10 @@ def settings_of_ancestors(creature: Creature, config: Config) -> Config:
         ancestors=AncestorsConfig(),
     )
     rollout = dataclasses.replace(
-        own.rollout, physics=config.rollout.physics, step=config.rollout.step
+        own.rollout,
+        physics=config.rollout.physics,
+        step=config.rollout.step,
+        starts=ancestors.starts or own.rollout.starts,
     )
     return dataclasses.replace(
         own,

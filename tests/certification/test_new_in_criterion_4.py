@@ -55,7 +55,12 @@ def test_new_disturbances_of_other_settings():
     for name in ("wilson", "gritz_hahn"):
         creature = "luxo" if name == "gritz_hahn" else "tall_quadruped"
         assert new(config_of(creature, name).rollout) > WALK | {"gains", "friction"}
-    assert config_of("blocks").rollout.starts == 1
+    blocks = load_creature("blocks").settings.train
+    starts = {
+        task: resolve_config(blocks, "blocks", use={"task": task}).rollout.starts
+        for task in ("swim", "walk", "jump", "follow", "follow-on-land")
+    }
+    assert starts == {"swim": 2, "walk": 2, "jump": 2, "follow": 4, "follow-on-land": 4}
 
 
 def test_new_disturbances_of_imported_bodies():

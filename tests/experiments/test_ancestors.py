@@ -219,7 +219,8 @@ def test_followers_come_from_runs_without_a_light():
         assert (chosen.task, chosen.runs, settings.controller.steer) == (before, 6, True)
         own = settings_of_ancestors(blocks, settings)
         assert (own.use.task, own.controller.steer) == (mode, True)
-        assert own.controller.strength == (1.0, 1.0), "of the easier task"
+        assert own.evolution.survival == "best", "of the easier task"
+        assert own.rollout.starts == 1, "the task itself has two"
 
 
 @pytest.mark.parametrize(("choice", "drawn"), [(0, 8), (3, 3)])

@@ -113,7 +113,7 @@ def test_creature_settings_can_be_for_one_task_only():
         resolve_config(creature.settings.train, "blocks", use={"task": task}).rollout.starts
         for task in ("swim", "follow")
     ]
-    assert starts == [1, 4]
+    assert starts == [2, 4]
 
 
 @pytest.mark.parametrize(
