@@ -126,7 +126,7 @@ def pushes(share: float, config: CertificateConfig) -> Criterion:
 
 
 def physics(window: Recording, config: PhysicsConfig) -> Criterion:
-    """Criterion 8 of a body with hips, whose speed and penetration count in units of its size."""
+    """Criterion 8 of a body with hips: speed and penetration count in units of its size."""
     size = window.dimensions
     speed = window.body_speed.max() / np.sqrt(size.gravity * size.hip_height)
     depth = window.penetration.max() / size.hip_height

@@ -94,7 +94,8 @@ def resolve_config(
     chosen = meant(_chosen([*given, *mine.general, *mine.creature], use or {}))
     if not mine.standalone:
         tables = _layers_of(of_tasks, chosen, meant, f"{creature_name}/creature.toml: [train.task")
-        given += [(w, {**table, "use": dataclasses.asdict(chosen)}) for w, table in tables]
+        written = {**general.get("use", {}), "task": chosen.task}
+        given += [(w, {**table, "use": written}) for w, table in tables]
     cls = config_class(chosen)
     table: Table = {}
     for where, layer in [

@@ -115,7 +115,7 @@ def _check_patterns(model: mujoco.MjModel, keep: Sequence[str], freeze: Sequence
     names = [model.joint(j).name for j in range(model.njnt)]
     for option, patterns in (("--keep", keep), ("--freeze", freeze)):
         for pattern in patterns:
-            if not fnmatch.filter(names, pattern):
+            if not any(fnmatch.fnmatchcase(name, pattern) for name in names):
                 raise UserError(
                     f"{option} {pattern}: no joint of the file has such a name; "
                     f"{did_you_mean(pattern, names)}"

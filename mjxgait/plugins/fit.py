@@ -5,7 +5,7 @@ from mjxgait.controllers.expressions.written import check_programs
 from mjxgait.creature import Creature
 from mjxgait.creature.ground.spec import FLAT
 from mjxgait.errors import UserError
-from mjxgait.kinds import controller_kind, known_controller, known_task, tasks
+from mjxgait.kinds import controller_kind, known_task, tasks
 
 
 def check_fit(creature: Creature, config: Config) -> None:
@@ -21,16 +21,6 @@ def check_fit(creature: Creature, config: Config) -> None:
         _check_growing(creature, config)
     else:
         _check_given(creature, config)
-
-
-def check_controller_grows(creature: Creature, controller: str) -> None:
-    """Refuse a controller of bodies that are there, for a body that grows."""
-    kind = known_controller(controller)
-    if creature.settings.creature.grows and kind and not kind.grows:
-        raise UserError(
-            f"{creature.name}: its body grows with its brain, so {controller} has nothing to move; "
-            "leave --controller out"
-        )
 
 
 def _check_options(creature: Creature, config: Config) -> None:
@@ -74,8 +64,12 @@ def _check_given(creature: Creature, config: Config) -> None:
 
 def _check_growing(creature: Creature, config: Config) -> None:
     """Refuse settings of bodies that a file gives, for a body that grows."""
-    task, name = config.use.task, creature.name
-    check_controller_grows(creature, config.use.controller)
+    controller, task, name = config.use.controller, config.use.task, creature.name
+    if not controller_kind(controller).grows:
+        raise UserError(
+            f"{name}: its body grows with its brain, so {controller} has nothing to move; leave "
+            "--controller out"
+        )
     if task in tasks() and not tasks()[task].modular:
         known = ", ".join(name for name, one in tasks().items() if one.modular)
         raise UserError(f"{name}: bodies that grow cannot {task}, only {known}")

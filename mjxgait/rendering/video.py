@@ -60,7 +60,7 @@ def write_captions(
     size, now = max(stage.height // 20, 13), frame * stage.time_step
     lead = runners[0].walk
     if len({runner.walk.creature.name for runner in runners}) == 1:
-        draw.text((12, 10), spoken(lead), fill=DARK_INK, font=font(size))
+        draw.text((12, 10), lead.creature.title, fill=DARK_INK, font=font(size))
     time = f"{now:.1f} s" + (f"  (slowed {slow:g} times)" if slow != 1 else "")
     draw.text((stage.width - 12, 10), time, fill=DARK_INK, font=font(size), anchor="ra")
     if len(runners) == 1:
@@ -79,11 +79,6 @@ def write_captions(
         left, top, right, bottom = draw.textbbox((x, y), text, font=letters, anchor="rm")
         draw.rectangle((left - 4, top - 3, right + 4, bottom + 3), fill=PAPER)
         draw.text((x, y), text, fill=DARK_INK, font=letters, anchor="rm")
-
-
-def spoken(walk: Walk) -> str:
-    """Return the creature's name as written in pictures."""
-    return walk.creature.title
 
 
 def condition(walk: Walk, time: float) -> str:
@@ -199,7 +194,7 @@ def champion_of(run: Path, seconds: float) -> Runner:
 def champions_of(runs: Sequence[Path], seconds: float) -> list[Runner]:
     """Return each run's champion, labelled by creature, or by folder if creatures repeat."""
     walks = [champion_of(run, seconds).walk for run in runs]
-    names = [spoken(walk) for walk in walks]
+    names = [walk.creature.title for walk in walks]
     for others in ([run.resolve().name for run in runs], [str(run) for run in runs]):
         names = names if len(set(names)) == len(names) else others
     return [Runner(walk, name) for walk, name in zip(walks, names, strict=True)]

@@ -2,7 +2,6 @@
 
 import base64
 import html
-import json
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +11,7 @@ from mjxgait.animation.export.school import School, Track, build_school
 from mjxgait.errors import UserError
 from mjxgait.rendering.gallery import Entry, tally
 from mjxgait.web.certificate import table
-from mjxgait.web.templates import asset, embedded_viewer, style, template
+from mjxgait.web.templates import asset, embedded, embedded_json, style, template, viewer_script
 
 RATE = 25
 """Key frames per second; the page interpolates."""
@@ -33,9 +32,9 @@ def build_gallery(shown: Sequence[Entry], title: str) -> str:
         title=html.escape(title),
         style=style(),
         lead=html.escape(f"{certified} of {len(shown)} certified. By strategy: {tally(shown)}."),
-        facts=json.dumps({"scenes": scenes}).replace("<", "\\u003c"),
+        facts=embedded_json({"scenes": scenes}),
         table=_table(shown),
-        viewer=embedded_viewer(),
+        viewer=embedded(viewer_script()),
         code=asset("gallery.js"),
     )
 

@@ -17,7 +17,7 @@ from mjxgait.rendering.video import LOOP_SECONDS
 from mjxgait.rendering.walk import Walk, doubt, record_walk
 from mjxgait.training.folder import METRICS, open_champion, read_metrics
 from mjxgait.web.certificate import certificate_summary, certificate_table, table
-from mjxgait.web.templates import embedded_viewer, style, template
+from mjxgait.web.templates import embedded, style, template, viewer_script
 
 RATE = 30
 FARTHEST = 3.0
@@ -67,7 +67,7 @@ def build_page(walk: Walk, loop: WalkLoop, verdict: str, sections: str) -> str:
         far=f"{far:.3f}m",
         farthest=f"{FARTHEST * far:.3f}m",
         frames=len(loop.times) - 1,
-        viewer=embedded_viewer(),
+        viewer=embedded(viewer_script()),
         sections=sections,
     )
 
@@ -161,5 +161,5 @@ def driven_page(
         glb=base64.b64encode(glb).decode("ascii"),
         target=f"0m {0.6 * creature.frame.stand_pos[2]:.3f}m 0m",
         far=f"{DRIVE_FAR * creature.model.stat.extent:.3f}m",
-        viewer=embedded_viewer(),
+        viewer=embedded(viewer_script()),
     )

@@ -3,7 +3,6 @@
 import base64
 import gzip
 import html
-import json
 from pathlib import Path
 
 import mujoco
@@ -18,7 +17,7 @@ from mjxgait.rendering.walk import doubt, record_walk
 from mjxgait.training.folder import open_champion
 from mjxgait.web.facts import Facts, facts_of
 from mjxgait.web.page import save_page
-from mjxgait.web.templates import asset, embedded_viewer, style, template
+from mjxgait.web.templates import asset, embedded, embedded_json, style, template, viewer_script
 from mjxgait.web.wasm import PACKAGE, VERSION, Engine, engine_from
 
 SECONDS = 5.0
@@ -109,12 +108,12 @@ def build_physics_page(
         wide=f"{np.degrees(WIDE):g}deg",
         far=f"{far:.3f}m",
         farthest=f"{FARTHEST * far:.3f}m",
-        facts=_json(facts),
-        page=_json(page),
+        facts=embedded_json(facts),
+        page=embedded_json(page),
         # The same bytes on every day and machine.
         binary=base64.b64encode(gzip.compress(engine.binary, 6, mtime=0)).decode("ascii"),
-        viewer=embedded_viewer(),
-        engine=script.replace("</script", "<\\/script"),
+        viewer=embedded(viewer_script()),
+        engine=embedded(script),
         modules="\n".join(_module(name, kind) for name, kind in CLASSES.items()),
         code=asset("physics.js"),
     )
@@ -132,8 +131,3 @@ def _extent(model: mujoco.MjModel, qpos: np.ndarray) -> tuple[float, float]:
 def _module(name: str, kind: str) -> str:
     """Script element with a module, whose class other scripts find under its name."""
     return f'<script type="module">\n{asset(name)}\nglobalThis.{kind} = {kind};\n</script>'
-
-
-def _json(value: object) -> str:
-    """JSON that cannot end the script element that holds it."""
-    return json.dumps(value).replace("<", "\\u003c")

@@ -1,5 +1,6 @@
 """Files of `assets/`, out of which the pages are made."""
 
+import json
 import string
 from importlib import resources
 
@@ -24,6 +25,11 @@ def viewer_script() -> str:
     return asset("model-viewer.min.js").rsplit("//# sourceMappingURL", 1)[0]
 
 
-def embedded_viewer() -> str:
-    """Return the viewer's script, ready to be embedded in a page."""
-    return viewer_script().replace("</script", "<\\/script")
+def embedded(script: str) -> str:
+    """Return a script that does not end the script element that holds it."""
+    return script.replace("</script", "<\\/script")
+
+
+def embedded_json(value: object) -> str:
+    """Return JSON that does not end the script element that holds it."""
+    return json.dumps(value).replace("<", "\\u003c")

@@ -12,7 +12,6 @@ from mjxgait.config.tables import build, merge, not_none, read_toml
 from mjxgait.controllers.key_poses.config import unhurried
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
-from mjxgait.plugins.fit import check_controller_grows
 from mjxgait.plugins.registry import resolve_config
 from mjxgait.tasks.walk.criteria import SPARE
 from mjxgait.tasks.walk.gaits import (
@@ -90,7 +89,6 @@ def configured(
     Raises:
       UserError: names the layer and the key, or the target.
     """
-    check_controller_grows(creature, use.get("controller", ""))
     config = resolve_config(creature.settings.train, creature.name, file, use)
     walks = config.use.task == "walk" and config.use.controller == "poses"
     if targets != WalkTargets() or file is not None or not walks:
