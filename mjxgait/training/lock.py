@@ -16,6 +16,7 @@ from typing import BinaryIO
 
 from mjxgait.errors import UserError
 from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import command
 
 try:
     import fcntl
@@ -75,10 +76,8 @@ def why_empty(run: Path) -> str:
     """Return why a run has no results yet."""
     if writer := running(run):
         return f"it runs now ({writer}) and has not done its first generation"
-    return (
-        "the run ended before its first generation was done; `mjxgait train --resume "
-        f"{run}` goes on with it"
-    )
+    resume = command("train", "--resume", run, run=run)
+    return f"the run ended before its first generation was done; `{resume}` goes on with it"
 
 
 def _acquired(folder: Path) -> BinaryIO:
