@@ -220,6 +220,12 @@ def _layers(
             raise UserError(
                 f"{given.resume}: a resumed run keeps its settings; other targets need a new run"
             )
+        for name in ("env", "config"):
+            if getattr(given, name):
+                raise UserError(
+                    f"{given.resume}: a resumed run keeps its creature and its settings; leave --{name} "
+                    "out"
+                )
         folder = Path(given.resume)
         return open_run(folders_of(folder)[0] if is_zoo(folder) else folder)
     scales = parse_scales(given.scale or ())

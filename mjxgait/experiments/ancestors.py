@@ -15,6 +15,7 @@ from mjxgait.creature import Creature
 from mjxgait.distributed.evolve import scheduler_at
 from mjxgait.distributed.jobs import Advanced
 from mjxgait.distributed.rows import Rows
+from mjxgait.errors import UserError
 from mjxgait.experiments.multi_seed import bests, create_zoo, folders_of, is_zoo
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 from mjxgait.training.disk import disk_errors
@@ -50,8 +51,11 @@ def evolve_ancestors(folder: Path, creature: Creature, config: Config, say: Say)
         f"First {ancestors.runs} runs of the task {ancestors.task}, of "
         f"{ancestors.generations} generations: their best begin this run."
     )
-    runs = folders_of(place)
-    rows = Rows(creature, runs, partial(_tell, say))
+    try:
+        runs = folders_of(place)
+        rows = Rows(creature, runs, partial(_tell, say))
+    except UserError as error:
+        raise UserError(f"{error}; take {place} away to evolve these small runs anew") from None
     with interruptible() as interrupted, scheduler_at(None) as scheduler:
         if rows.to_the_end(scheduler, interrupted.is_set) is None:
             return None

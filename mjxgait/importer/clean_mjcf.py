@@ -5,7 +5,7 @@ import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from mjxgait.errors import UserError
+from mjxgait.errors import UserError, listed
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.source import (
     MOST_ELEMENTS,
@@ -58,6 +58,7 @@ def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None
     _include(tree, path, places, [0, 0])
     folders = _compiler(tree)
     _radians(tree, notes)
+    _order_ranges(tree, notes)
     source.poses = [
         n
         for n in (
@@ -138,6 +139,18 @@ def _radians(tree: ET.Element, notes: Notes) -> None:
     if sum(map(bool, stated)) >= FEW_RANGES and max(angles) <= math.tau:
         tree.append(ET.Element("compiler", angle="radian"))
         notes.change("angles read as radians", "in degrees no joint could move by more than 6.3")
+
+
+def _order_ranges(tree: ET.Element, notes: Notes) -> None:
+    """Swap limits in the wrong order, with which MuJoCo leaves a joint without limits."""
+    swapped = []
+    for joint in tree.iter("joint"):
+        match numbers(joint.get("range")):
+            case [low, high] if low > high:
+                joint.set("range", f"{high!r} {low!r}")
+                swapped.append(joint.get("name") or joint.get("class") or "of a class")
+    if swapped:
+        notes.change(f"limits of joints {listed(swapped)} swapped", "the upper one was the smaller")
 
 
 def _drop_inner(tree: ET.Element, notes: Notes) -> None:

@@ -4,11 +4,13 @@ Meshes are loaded or dropped, broken inertias mended, efforts read.
 """
 
 import xml.etree.ElementTree as ET
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from mjxgait.errors import UserError, listed
+from mjxgait.errors import UserError, did_you_mean, listed
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.source import Places, Source, load_mesh, lost, numbers
 
@@ -45,6 +47,7 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
             robot.remove(element)
     if not robot.findall("link"):
         raise UserError(f"{path}: a URDF without a <link>; this is not a robot")
+    _check_tree(robot, path)
     for element in robot.iter("material"):
         for texture in element.findall("texture"):
             element.remove(texture)
@@ -66,6 +69,60 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
     extension = ET.Element("mujoco")
     ET.SubElement(extension, "compiler", COMPILER)
     robot.insert(0, extension)
+
+
+def _check_tree(robot: ET.Element, path: Path) -> None:
+    """Refuse names that occur twice, and joints that do not form a tree.
+
+    Raises:
+      UserError: names the link or the joint.
+    """
+    for kind in ("link", "joint"):
+        if twice := _repeated(element.get("name", "") for element in robot.findall(kind)):
+            raise UserError(f'{path}: two {kind}s are named "{twice}"; rename one of them')
+    links = {link.get("name", "") for link in robot.findall("link")}
+    above: dict[str, str] = {}
+    for joint in robot.findall("joint"):
+        parent, child = (_end(joint, side) for side in ("parent", "child"))
+        for link in (parent, child):
+            if link not in links:
+                raise UserError(
+                    f'{path}: joint "{joint.get("name", "")}" is on link "{link}", which the file does '
+                    f"not have; {did_you_mean(link, links)}"
+                )
+        if child in above:
+            raise UserError(
+                f'{path}: link "{child}" is the child of two joints, which closes a loop; only trees '
+                "can be simulated here, so take one of them out"
+            )
+        above[child] = parent
+    _check_rooted(above, path)
+
+
+def _check_rooted(above: Mapping[str, str], path: Path) -> None:
+    """Refuse links in a ring. above: the parent of each link that has one."""
+    rooted: set[str] = set()
+    for link in above:
+        way: set[str] = set()
+        while link in above and link not in rooted:
+            if link in way:
+                raise UserError(
+                    f'{path}: the joints above link "{link}" lead back to it; take one of them out'
+                )
+            way.add(link)
+            link = above[link]
+        rooted |= way
+
+
+def _repeated(names: Iterable[str]) -> str:
+    """First name that occurs twice; empty if none does."""
+    return next((name for name, count in Counter(names).items() if count > 1), "")
+
+
+def _end(joint: ET.Element, side: str) -> str:
+    """Name of the link on a side of a joint, parent or child; empty if none is stated."""
+    element = joint.find(side)
+    return element.get("link", "") if element is not None else ""
 
 
 def _shapes(source: Source, link: ET.Element, stated: bool, places: Places, notes: Notes) -> None:
@@ -122,6 +179,9 @@ def _inertial(link: ET.Element, notes: Notes) -> bool:
         return False
     if mass[0] < LEAST_MASS:
         link.remove(inertial)
+        if link.find("collision") is not None or link.find("visual") is not None:
+            what = f'mass of link "{name}" taken from its shapes, as of water'
+            notes.change(what, f"the stated mass is {mass[0]:g} kg")
         return True
     inertia = inertial.find("inertia")
     values = [
@@ -163,12 +223,23 @@ def _possible(moments: np.ndarray, mass: float) -> np.ndarray:
     return raised
 
 
+def _order_limits(joint: str, limit: ET.Element, notes: Notes) -> None:
+    """Swap limits in the wrong order, with which MuJoCo leaves a joint without limits."""
+    low, high = (numbers(limit.get(key, "0")) or [0.0] for key in ("lower", "upper"))
+    if low[0] > high[0]:
+        limit.set("lower", repr(high[0]))
+        limit.set("upper", repr(low[0]))
+        notes.change(f'limits of joint "{joint}" swapped', "the upper one was the smaller")
+
+
 def _joint(source: Source, joint: ET.Element, notes: Notes) -> None:
     name = joint.get("name", "")
     limit = joint.find("limit")
     effort = numbers((limit.attrib if limit is not None else {}).get("effort"))
     if effort and effort[0] > 0:
         source.efforts[name] = effort[0]
+    if limit is not None:
+        _order_limits(name, limit, notes)
     mimic = joint.find("mimic")
     if mimic is not None:
         source.coupled.append(name)

@@ -31,6 +31,12 @@ def _check_options(creature: Creature, config: Config) -> None:
             f"examination.level = {config.examination.level}: it is for walks, and this task is "
             f"{task}"
         )
+    kind = known_task(task)
+    if config.rollout.moves and kind and "follow" not in kind.tables:
+        raise UserError(
+            f"{name}: rollout.moves moves the lights of followers, and the task {task} has none; leave "
+            "it out"
+        )
     if config.evolution.family < 1 and config.evolution.islands.count > 1:
         raise UserError(
             f"{name}: evolution.family is for one population, and islands are several as they are; "

@@ -264,7 +264,7 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
       UserError: it is not a run folder, or its controller or task was not named.
     """
     if not (folder / CONFIG).exists():
-        raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
+        raise UserError(f"{folder}: {_no_run(folder)}")
     table = read_toml(folder / CONFIG)
     try:
         config = build_config(table, str(folder / CONFIG))
@@ -274,6 +274,16 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
     except UserError as error:
         raise _of_version(error, folder) from None
     return load_creature(folder / CREATURE).on(config.rollout.ground), config
+
+
+def _no_run(folder: Path) -> str:
+    """Return why a folder is no run folder, and a run within it if there is one."""
+    if not folder.is_dir():
+        return "no such folder" if not folder.exists() else "a file; name a run folder"
+    within = sorted(path.parent for path in folder.glob(f"*/{CONFIG}"))
+    if within:
+        return f"a folder of runs, and this is for one; name it, such as {within[0]}"
+    return f"not a run folder (it has no {CONFIG})"
 
 
 def open_champion(folder: Path) -> tuple[Creature, Champion]:

@@ -19,7 +19,11 @@ from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.creature import Creature
 from mjxgait.distributed.rows import Rows
 from mjxgait.errors import UserError
-from mjxgait.experiments.ancestors import first_genomes, settings_of_ancestors
+from mjxgait.experiments.ancestors import (
+    evolve_ancestors,
+    first_genomes,
+    settings_of_ancestors,
+)
 from mjxgait.experiments.multi_seed import create_zoo, folders_of
 from mjxgait.output import Output
 from mjxgait.plugins import resolve_config
@@ -117,6 +121,17 @@ def test_a_killed_run_resumes_to_the_same_result(
     assert read_metrics(folder / METRICS)[-1]["best"] == bests(finished)[-1]
     now, before = (read_stored(run, stool.digest).arrays for run in (folder, finished))
     np.testing.assert_array_equal(now["genomes.key_poses"], before["genomes.key_poses"])
+
+
+def test_damaged_ancestors_name_the_way_out(finished: Path, tmp_path: Path, stool: Creature):
+    settings, place = open_run(finished)[1], tmp_path / ANCESTORS
+    shutil.copytree(finished / ANCESTORS, place)
+    shutil.rmtree(next(place.glob("seed*")))
+    with pytest.raises(UserError, match=f"take {place} away to evolve"):
+        evolve_ancestors(tmp_path, stool, settings, print)
+    (place / "zoo.toml").write_text("seeds = 3")
+    with pytest.raises(UserError, match=f"take {place} away to evolve"):
+        evolve_ancestors(tmp_path, stool, settings, print)
 
 
 def test_a_run_that_has_begun_needs_no_ancestors(finished: Path, tmp_path: Path, stool: Creature):

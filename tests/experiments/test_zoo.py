@@ -145,6 +145,14 @@ def test_resumed_runs_keep_their_settings(finished: Path, capsys: pytest.Capture
     for given in (("--generations", 9), ("--runs", 4)):
         said = said_by(capsys, "train", "--resume", finished, *given, code=2)
         assert "keep their number, body and settings" in said
+    said = said_by(capsys, "train", "--resume", finished, "--env", "crab", code=2)
+    assert "leave --env out" in said
+
+
+def test_a_folder_of_runs_names_one_where_one_is_wanted(finished: Path, capsys):
+    said = said_by(capsys, "certify", finished, code=2)
+    assert "a folder of runs, and this is for one" in said
+    assert str(finished / "seed") in said
 
 
 def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture):

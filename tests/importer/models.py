@@ -1,8 +1,14 @@
-"""Two small animals that tests import: an MJCF quadruped with what real files hold, and a URDF
-biped.
+"""Two small animals that tests import, and their import.
+
+An MJCF quadruped with what real files hold, and a URDF biped.
 """
 
 from functools import reduce
+from pathlib import Path
+
+from mjxgait.api.bodies import write_folder
+from mjxgait.creature import Creature, load_creature
+from mjxgait.importer import ImportChoices, Imported, import_model
 
 LEG = """
       <body name="{n}_thigh" pos="{x} {y} 0">
@@ -122,3 +128,15 @@ def _biped() -> str:
 
 
 BIPED = _biped()
+
+
+def bring(folder: Path, text: str, kind: str = "xml", **choices) -> tuple[Creature, Imported]:
+    file = folder / f"model.{kind}"
+    file.write_text(text, encoding="utf-8")
+    imported = import_model(file, ImportChoices(apart=False, **choices))
+    write_folder(folder / "mine", imported)
+    return load_creature(folder / "mine"), imported
+
+
+def told(imported: Imported, words: str) -> bool:
+    return words in imported.notes.text()

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from helpers import altered, pose_champion
-from importer.models import BIPED, CORNERS, QUADRUPED, ROLLING
+from importer.models import BIPED, CORNERS, QUADRUPED, ROLLING, bring, told
 
 from mjxgait.api.bodies import write_folder
 from mjxgait.certification.trials import simulate
@@ -21,7 +21,7 @@ from mjxgait.cli.training import _layers
 from mjxgait.config.layers import find_creature, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.importer import ImportChoices, Imported, import_model, stance
+from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.portrait import facts, portrait
 from mjxgait.importer.stand_test import stand_test
 from mjxgait.importer.write_toml import _quoted
@@ -29,25 +29,6 @@ from mjxgait.reference.starts import perturbed_starts
 
 DIGITS = 1e-5
 """MuJoCo writes numbers with six digits."""
-
-
-@pytest.fixture
-def a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The standing pose is sought a sixth as long, where it is not what a test looks at."""
-    monkeypatch.setattr(stance, "FIRST", 60)
-    monkeypatch.setattr(stance, "ROUNDS", 4)
-
-
-def bring(folder: Path, text: str, kind: str = "xml", **choices) -> tuple[Creature, Imported]:
-    file = folder / f"model.{kind}"
-    file.write_text(text, encoding="utf-8")
-    imported = import_model(file, ImportChoices(apart=False, **choices))
-    write_folder(folder / "mine", imported)
-    return load_creature(folder / "mine"), imported
-
-
-def told(imported: Imported, words: str) -> bool:
-    return words in imported.notes.text()
 
 
 def test_a_quadruped_stands_on_four_feet_and_knows_its_left_and_right(tmp_path):

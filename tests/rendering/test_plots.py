@@ -85,8 +85,11 @@ def test_nothing_to_plot_is_reported(stool, tmp_path):
     (run / METRICS).unlink()
     with pytest.raises(UserError, match="nothing to plot"):
         plot_run(run)
-    with pytest.raises(UserError, match="not a run folder"):
+    with pytest.raises(UserError, match="a folder of runs, and this is for one; name it"):
         plot_run(tmp_path)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UserError, match="not a run folder"):
+        plot_run(tmp_path / "empty")
 
 
 def test_missing_numbers_are_gaps():

@@ -149,6 +149,7 @@ def test_creature_settings_can_be_for_one_task_only():
             "evolution.family is for one population",
         ),
         ("tall_quadruped", {"rollout": {"step": 0.002}}, "rollout.step is for bodies that grow"),
+        ("tall_quadruped", {"rollout": {"moves": 2.0}}, "rollout.moves moves the lights of foll"),
         (
             "blocks",
             {"use": {"controller": "brain", "task": "jump"}, "rollout": {"step": 0.002}},

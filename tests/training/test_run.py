@@ -406,7 +406,7 @@ def test_a_changed_creature_is_refused(
         (["train", "--population", "1"], "population must be at least 2"),
         (["train", "--evolution.populaton", "7"], "--evolution.population"),
         (["train", "--rollout.seconds", "-1"], "rollout.seconds = -1.0"),
-        (["train", "--resume", "nowhere"], "nowhere: not a run folder"),
+        (["train", "--resume", "nowhere"], "nowhere: no such folder"),
         (["train", "--out", "/proc/run"], "cannot be written"),
     ],
 )

@@ -34,6 +34,8 @@ class BrainConfig:
       sigma: size of these changes, as a share of the range.
       connect: chance of adding or removing a connection.
       grow: chance of a new node.
+      resize: chance of multiplying all sizes of the body by one factor, log-normally distributed with
+        spread `sigma`; ours, not Sims'.
       strength: range of a factor that each mutation draws, log-uniformly; it multiplies the number
         of values that change and, up to 1, the chances `connect` and `grow`.
       crossover: share of two-parent offspring with crossed nodes.
@@ -56,6 +58,7 @@ class BrainConfig:
     sigma: Positive = 0.2
     connect: Fraction = 0.5
     grow: Fraction = 0.25
+    resize: Annotated[Fraction, ADDED] = 0.0
     strength: tuple[Positive, Positive] = (1.0, 1.0)
     crossover: Fraction = 0.3
     grafting: Fraction = 0.3

@@ -56,7 +56,12 @@ class Brains:
     def variation(self, settings: BrainConfig, evolution: EvolutionConfig) -> Variation:
         """Offspring are crossed, grafted, or have one parent."""
         rates = Rates(
-            settings.values, settings.sigma, settings.connect, settings.grow, settings.strength
+            value=settings.values,
+            sigma=settings.sigma,
+            connection=settings.connect,
+            node=settings.grow,
+            resize=settings.resize,
+            strength=settings.strength,
         )
         kin = Kin(self.capacity, self.room, Ranges(), rates)
 

@@ -43,7 +43,8 @@ class Rates:
 
     value: numbers, kinds and flags of connected nodes that change on average; divided by their
     count, the chance of each. sigma: of a number's change, as a share of its range. connection:
-    chance of one more or one less. node: chance of a new node. strength: range of a factor that
+    chance of one more or one less. node: chance of a new node. resize: chance of one factor on all
+    sizes. strength: range of a factor that
     each mutation draws, log-uniformly, for these chances; those of connections and nodes never
     exceed the given ones (Doerr et al. 2017, "Fast genetic algorithms": why few large changes among
     many small ones).
@@ -53,6 +54,7 @@ class Rates:
     sigma: float = BrainConfig.sigma
     connection: float = BrainConfig.connect
     node: float = BrainConfig.grow
+    resize: float = BrainConfig.resize
     strength: tuple[float, float] = BrainConfig.strength
 
 
@@ -75,14 +77,16 @@ class Kin:
         )
 
     def mutate(self, key: jax.Array, genotype: Genotype) -> Genotype:
-        """Change values, add or remove a connection, and draw an unconnected node anew."""
+        """Change values and the size, add or remove a connection, draw an unconnected node anew."""
         value, fresh, connect, node = jax.random.split(key, 4)
         other, strength = self.create(fresh), self._strength(jax.random.fold_in(key, 4))
         often = jnp.minimum(strength, 1.0)
         changed = _with_new_node(node, genotype, other, often * self.rates.node)
         graph = _reconnected(connect, changed.graph, other.graph, often * self.rates.connection)
         changed = dataclasses.replace(changed, graph=graph)
-        return self._moved(value, changed, other, strength)
+        moved = self._moved(value, changed, other, strength)
+        size = self._resized(jax.random.fold_in(key, 5), moved.graph)
+        return dataclasses.replace(moved, graph=size)
 
     def cross(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
         """Return a child with the mother's nodes, and the father's between two crossover points."""
@@ -151,6 +155,18 @@ class Kin:
         return dataclasses.replace(
             found, graph=dataclasses.replace(found.graph, used=genotype.graph.used)
         )
+
+    def _resized(self, key: jax.Array, graph: Graph) -> Graph:
+        """Multiply all sizes by one factor, with a chance.
+
+        Strength goes with the square of a body's length and weight with its cube, so this is the
+        shortest way to a body that jumps higher, and changes of single sizes seldom lead there.
+        """
+        drawn = uniforms(key, {"happens": (), "factor": ()})
+        factor = jnp.exp(self.rates.sigma * normal(drawn["factor"]))
+        scaled = jnp.clip(graph.half * factor, *self.ranges.half)
+        half = jnp.where(drawn["happens"] < self.rates.resize, scaled, graph.half)
+        return dataclasses.replace(graph, half=half)
 
     def _bounds(self, shape: jax.tree_util.PyTreeDef) -> list[tuple[float, float]]:
         """Return the lowest and highest value of each leaf; they do not matter for kinds."""

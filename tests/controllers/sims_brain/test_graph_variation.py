@@ -184,6 +184,28 @@ def test_with_random_strengths_most_mutations_are_mild_and_few_strong(
     assert 1 - same.mean() == pytest.approx(0.8 * 0.47, abs=0.05)
 
 
+def test_a_resize_multiplies_all_sizes_by_one_factor(parents: tuple[Genotype, Genotype]):
+    rates = Rates(value=0.0, connection=0.0, node=0.0, resize=0.25)
+    keys = jax.random.split(key_of(3), COUNT)
+    child = jax.jit(jax.vmap(Kin(CAPACITY, ROOM, RANGES, rates).mutate))(keys, parents[0])
+    factor = np.asarray(child.graph.half / parents[0].graph.half)
+    resized = (factor != 1).any((1, 2))
+    assert resized.mean() == pytest.approx(0.25, abs=0.04)
+    low, high = RANGES.half
+    within = np.asarray((child.graph.half > low) & (child.graph.half < high))
+    spread = [np.ptp(one[free]) for one, free in zip(factor, within, strict=True) if free.any()]
+    assert max(spread) < 1e-5
+    assert np.std(np.log(np.median(factor[resized], (1, 2)))) == pytest.approx(0.2, abs=0.03)
+    same = jax.tree.map(
+        jnp.array_equal,
+        dataclasses.replace(
+            child, graph=dataclasses.replace(child.graph, half=parents[0].graph.half)
+        ),
+        parents[0],
+    )
+    assert all(jax.tree.leaves(same))
+
+
 @pytest.mark.thorough("a special case; test_a_mutation_changes_a_few_values has the usual numbers")
 def test_central_neurons_do_not_change_a_graphs_mutation():
     """Central neurons do not grow, so they do not count among the values of which a few change."""
