@@ -1,6 +1,7 @@
 """Error for a user's mistake, and helpers for messages."""
 
 import difflib
+import fnmatch
 from collections.abc import Iterable, Sequence
 
 INTERRUPTED = 130
@@ -40,6 +41,22 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     if near:
         return f'did you mean "{near[0]}"?'
     return f"known: {', '.join(names)}" if names else "none is known"
+
+
+def matching(pattern: str, names: Sequence[str], what: str, where: str) -> list[int]:
+    """Return the places of the names that match a shell pattern.
+
+    Args:
+      what: the kind of thing that the names belong to, such as joint. where: the option or key that
+        holds the pattern.
+
+    Raises:
+      UserError: none matches, so the pattern would do nothing.
+    """
+    found = [i for i, name in enumerate(names) if fnmatch.fnmatchcase(name, pattern)]
+    if not found:
+        raise UserError(f'{where}: no {what} matches "{pattern}"; {did_you_mean(pattern, names)}')
+    return found
 
 
 def listed(names: Sequence[str], most: int = 6) -> str:

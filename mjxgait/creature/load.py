@@ -1,7 +1,6 @@
 """Load a creature folder: all facts that the other packages need, checked, in one frozen value."""
 
 import dataclasses
-import fnmatch
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -28,7 +27,7 @@ from mjxgait.creature.creature import (
 from mjxgait.creature.geometry import check_world
 from mjxgait.creature.joints import mirrored, stepping_of, swings_of
 from mjxgait.creature.settings import CreatureSettings, JointException
-from mjxgait.errors import UserError, did_you_mean
+from mjxgait.errors import UserError, did_you_mean, matching
 from mjxgait.files import read_text
 from mjxgait.tasks.walk.gaits import stations_of
 
@@ -227,7 +226,7 @@ def _trunk_axes(rotation: np.ndarray, forward: np.ndarray) -> np.ndarray:
 def _joint_values(settings: CreatureSettings, names: list[str]) -> dict[str, np.ndarray]:
     rows = [dataclasses.asdict(settings.joints) for _ in names]
     for exception in settings.joint:
-        for i in _matching(exception.match, names, "joint.match"):
+        for i in matching(exception.match, names, "joint", "creature.toml: joint.match"):
             rows[i].update(
                 {
                     k: v
@@ -239,19 +238,10 @@ def _joint_values(settings: CreatureSettings, names: list[str]) -> dict[str, np.
     return {key: np.array([row[key] for row in rows], dtype=float) for key in fields}
 
 
-def _matching(pattern: str, names: list[str], key: str) -> list[int]:
-    found = [i for i, name in enumerate(names) if fnmatch.fnmatchcase(name, pattern)]
-    if not found:
-        raise UserError(
-            f'creature.toml: {key}: no joint matches "{pattern}"; {did_you_mean(pattern, names)}'
-        )
-    return found
-
-
 def _weights(table: Mapping[str, float], names: list[str], key: str) -> np.ndarray:
     weights = np.zeros(len(names))
     for pattern, weight in table.items():
-        weights[_matching(pattern, names, key)] = weight
+        weights[matching(pattern, names, "joint", f"creature.toml: {key}")] = weight
     return weights
 
 

@@ -4,7 +4,6 @@ A walk backwards is evolved and examined as a walk forward of the body turned ar
 """
 
 import dataclasses
-import fnmatch
 import re
 import tempfile
 import tomllib
@@ -21,7 +20,7 @@ from mjxgait.creature.creature import Creature, vertical_freedom
 from mjxgait.creature.geometry import lowest
 from mjxgait.creature.load import load_creature
 from mjxgait.creature.settings import Balance, CreatureSettings, Steering, Stepping, Usual
-from mjxgait.errors import UserError, did_you_mean
+from mjxgait.errors import UserError, did_you_mean, matching
 
 MODEL, SETTINGS = "creature.xml", "creature.toml"
 SMALLEST, LARGEST = 0.2, 5.0
@@ -113,14 +112,8 @@ def scaled_files(
 def _factors(names: Sequence[str], scales: Mapping[str, float]) -> dict[str, float]:
     factors = dict.fromkeys(names, 1.0)
     for pattern, factor in scales.items():
-        found = [name for name in names if fnmatch.fnmatchcase(name, pattern)]
-        if not found:
-            raise UserError(
-                f'--scale {pattern}={factor:g}: no part matches "{pattern}"; '
-                f"{did_you_mean(pattern, names)}"
-            )
-        for name in found:
-            factors[name] *= factor
+        for i in matching(pattern, names, "part", f"--scale {pattern}={factor:g}"):
+            factors[names[i]] *= factor
     return factors
 
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.geometry import ancestors, posed, subtree
-from mjxgait.errors import UserError, did_you_mean, listed
+from mjxgait.errors import UserError, listed, matching
 from mjxgait.importer.anatomy import (
     HINGE,
     SLIDE,
@@ -115,11 +115,7 @@ def _check_patterns(model: mujoco.MjModel, keep: Sequence[str], freeze: Sequence
     names = [model.joint(j).name for j in range(model.njnt)]
     for option, patterns in (("--keep", keep), ("--freeze", freeze)):
         for pattern in patterns:
-            if not any(fnmatch.fnmatchcase(name, pattern) for name in names):
-                raise UserError(
-                    f"{option} {pattern}: no joint of the file has such a name; "
-                    f"{did_you_mean(pattern, names)}"
-                )
+            matching(pattern, names, "joint of the file", option)
 
 
 def _choose_joints(

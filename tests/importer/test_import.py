@@ -376,7 +376,7 @@ def test_the_report_says_what_became_of_stated_torques(stated: str, said: str, t
 @pytest.mark.parametrize(
     ("choices", "said"),
     [
-        (ImportChoices(keep=("zzz",)), "--keep zzz: no joint of the file has such a name"),
+        (ImportChoices(keep=("zzz",)), '--keep: no joint of the file matches "zzz"'),
         (ImportChoices(freeze=("left_hip_rol",)), 'did you mean "left_hip_roll"'),
         (ImportChoices(search=(Path("nowhere"),)), "--search nowhere: no such folder"),
     ],
