@@ -157,11 +157,7 @@ class Kin:
         )
 
     def _resized(self, key: jax.Array, graph: Graph) -> Graph:
-        """Multiply all sizes by one factor, with a chance.
-
-        Strength goes with the square of a body's length and weight with its cube, so this is the
-        shortest way to a body that jumps higher, and changes of single sizes seldom lead there.
-        """
+        """Multiply all sizes by one factor, with a chance: proportions stay as they are."""
         drawn = uniforms(key, {"happens": (), "factor": ()})
         factor = jnp.exp(self.rates.sigma * normal(drawn["factor"]))
         scaled = jnp.clip(graph.half * factor, *self.ranges.half)
