@@ -191,8 +191,8 @@ def finished(planned: Prepared, options: AblateRequest, output: Output) -> Path 
     Raises:
       UserError: the body is not supported, or the folder cannot be written.
     """
+    from mjxgait.experiments.ablation.measures import measure, read_logs
     from mjxgait.experiments.ablation.report import write_report
-    from mjxgait.experiments.ablation.rows import measure, read_logs
     from mjxgait.training.spec import check_spec
 
     folder, creature, plan = planned.folder, planned.creature, planned.plan

@@ -15,8 +15,8 @@ import numpy as np
 from scipy import stats
 from scipy.stats import DegenerateDataWarning, trim_mean
 
+from mjxgait.experiments.ablation.measures import Result
 from mjxgait.experiments.ablation.plan import Plan
-from mjxgait.experiments.ablation.rows import Result
 from mjxgait.files import replaced
 from mjxgait.rendering.curves import ACCENT, DARK, figure
 from mjxgait.training.folder import Line

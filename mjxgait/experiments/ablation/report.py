@@ -24,8 +24,8 @@ from mjxgait.experiments.ablation.findings import (
     share,
     trim_of,
 )
+from mjxgait.experiments.ablation.measures import Result
 from mjxgait.experiments.ablation.plan import Plan
-from mjxgait.experiments.ablation.rows import Result
 from mjxgait.files import replaced, write_text
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import Line

@@ -9,23 +9,23 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from mjxgait.experiments.ablation import rows
-from mjxgait.experiments.ablation.rows import Measured
+from mjxgait.experiments.ablation import measures
+from mjxgait.experiments.ablation.measures import Measured
 
 LAST = "2-0.json"
 """The champion at which the process is killed."""
-JUDGE = rows._evaluate
+JUDGE = measures._evaluate
 
 
 def evaluate(
     creature: Path, grounds: Sequence[str], examine: bool, champion: Path, finite: bool
 ) -> Measured:
-    """Stand-in for `rows._evaluate`: killed once, after another champion's result is on disk."""
-    rows.SECONDS, study = 1.0, creature.parent
+    """Stand-in for `measures._evaluate`: killed once, after another champion's result is on disk."""
+    measures.SECONDS, study = 1.0, creature.parent
     killed = study.with_name(f"{study.name}-was-killed")
     if champion.name == LAST and not killed.exists():
         killed.touch()
-        measured, until = study / rows.MEASURED, time.monotonic() + 60
+        measured, until = study / measures.MEASURED, time.monotonic() + 60
         while not measured.exists() or measured.read_bytes().count(b"\n") < 1:
             assert time.monotonic() < until
             time.sleep(0.01)

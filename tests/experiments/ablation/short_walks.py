@@ -3,9 +3,9 @@
 In its own file, because the evaluating processes read it again.
 """
 
-from mjxgait.experiments.ablation import rows
+from mjxgait.experiments.ablation import measures
 
-rows.SECONDS = 2.0
+measures.SECONDS = 2.0
 
 if __name__ == "__main__":
     from mjxgait.cli import main

@@ -26,7 +26,7 @@ from mjxgait.distributed import evolve
 from mjxgait.distributed.jobs import Programs
 from mjxgait.distributed.scheduler import LocalBackend
 from mjxgait.errors import INTERRUPTED
-from mjxgait.experiments.ablation import findings, rows
+from mjxgait.experiments.ablation import findings, measures, rows
 from mjxgait.training import stages
 from mjxgait.training.checkpoint import Checkpoints, Packed
 from mjxgait.training.folder import read_metrics
@@ -101,7 +101,7 @@ def cheap() -> Iterator[None]:
         patch.setattr(stages, "evaluate", made_up_evaluate)
         patch.setattr(evolve, "LocalBackend", partial(LocalBackend, programs))
         patch.setattr(mjxgait.processes, "cores", lambda: 1)
-        patch.setattr(rows, "_evaluate", killed.evaluate)
+        patch.setattr(measures, "_evaluate", killed.evaluate)
         patch.setattr(findings, "RESAMPLES", 499)
         yield
 
@@ -137,9 +137,9 @@ def finished(study: Path) -> tuple[Path, str]:
         f"mjxgait ablate --resume {folder}\n",
         told,
     )
-    before = (folder / rows.MEASURED).read_text()
+    before = (folder / measures.MEASURED).read_text()
     report = ended("ablate", "--resume", folder, code=0)[0]
-    assert (folder / rows.MEASURED).read_text().startswith(before)
+    assert (folder / measures.MEASURED).read_text().startswith(before)
     return folder, said.getvalue() + report
 
 
@@ -278,7 +278,7 @@ def test_ctrl_c_in_the_last_generation_ends_a_study_before_measuring(
 ):
     """The runs are complete, but measuring takes minutes too."""
     copy = shutil.copytree(finished[0], tmp_path / "copy")
-    (copy / rows.MEASURED).unlink()
+    (copy / measures.MEASURED).unlink()
 
     @contextlib.contextmanager
     def interrupted() -> Iterator[threading.Event]:
@@ -289,7 +289,7 @@ def test_ctrl_c_in_the_last_generation_ends_a_study_before_measuring(
     monkeypatch.setattr(rows, "interruptible", interrupted)
     said = ended("ablate", "--resume", copy, code=INTERRUPTED)[0]
     assert f"go on with: mjxgait ablate --resume {copy}" in said
-    assert not (copy / rows.MEASURED).exists()
+    assert not (copy / measures.MEASURED).exists()
 
 
 def test_a_study_that_would_take_days_is_refused_with_the_estimate(

@@ -7,6 +7,7 @@ import pytest
 from helpers import STOOL
 
 from mjxgait.creature import Creature
+from mjxgait.experiments.ablation.measures import Result
 from mjxgait.experiments.ablation.plan import (
     Plan,
     Study,
@@ -14,7 +15,6 @@ from mjxgait.experiments.ablation.plan import (
     make_plan,
 )
 from mjxgait.experiments.ablation.report import write_report
-from mjxgait.experiments.ablation.rows import Result
 
 SEEDS = 16
 RESULT = Result(
