@@ -105,7 +105,10 @@ def resolve_config(
         *mine.creature,
     ]:
         table = merge(table, layer)
-        build(cls, table, where)
+        try:
+            build(cls, table, where)
+        except UserError as error:
+            raise _explained(error, _absent(layer, chosen, meant)) from None
     table = merge(table, {"use": dataclasses.asdict(chosen)})
     config = build(cls, table, "the settings taken together")
     _check_other_tasks(mine, config, config_class, meant)
@@ -201,12 +204,30 @@ def _without_absent(layer: Table, use: UseConfig, meant: Meant) -> dict[str, Any
 
     The layer was written for the controller and task that it names, or else for the default ones.
     """
+    absent = _absent(layer, use, meant)
+    return {key: value for key, value in layer.items() if key not in absent}
+
+
+def _absent(layer: Table, use: UseConfig, meant: Meant) -> dict[str, str]:
+    """Tables of a layer that were written for another controller or task, and for which."""
     written = meant(build(UseConfig, layer.get("use", {}), "[use]"))
-    absent = {
-        "controller": use.controller != written.controller,
-        "fitness": use.task != written.task,
+    tables = {
+        "controller": ("controller", written.controller, use.controller),
+        "fitness": ("task", written.task, use.task),
     }
-    return {key: value for key, value in layer.items() if not absent.get(key)}
+    return {
+        table: f"the {kind} {before}"
+        for table, (kind, before, now) in tables.items()
+        if before != now and table in layer
+    }
+
+
+def _explained(error: UserError, absent: Mapping[str, str]) -> UserError:
+    """The error about a key of a user's file, with the reason if its table is of another kind."""
+    for table, kind in absent.items():
+        if f'"{table}.' in str(error):
+            return UserError(f"{error}; its [{table}] is for {kind}")
+    return error
 
 
 @dataclasses.dataclass(frozen=True)

@@ -315,6 +315,15 @@ def test_a_broken_file_is_named(tmp_path: Path):
         resolve_config({}, "x", file)
 
 
+def test_a_file_for_another_task_is_explained(tmp_path: Path):
+    with pytest.raises(UserError, match=r"its \[fitness\] is for the task walk"):
+        resolve_config({}, "luxo", Path("wilson"), use={"task": "hop"})
+    file = tmp_path / "mine.toml"
+    file.write_text("[fitness.weights]\nslip = 2.0\n[rollout]\nstart = 2\n")
+    with pytest.raises(UserError, match=r'unknown key "rollout.start"; did you mean "starts"\?$'):
+        resolve_config({}, "luxo", file, use={"task": "hop"})
+
+
 def test_an_unknown_creature_lists_the_known_ones():
     with pytest.raises(UserError, match="short_quadruped, tall_quadruped"):
         find_creature("dragon")
