@@ -143,15 +143,17 @@ def four_feet(body: Traits) -> tuple[Settings, Choice]:
         what += "; feet are down that bear weight"
         why += ": its motors are heavier to turn than all of it"
     settings: Settings = {"fitness": fitness}
-    if not (body.skeleton or body.bounces):
+    if not body.bounces:
         fitness["weights"] |= {"fall": 1.0, "airborne": LEAPS}
-        settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
         settings["rollout"] = {"latency": LATE}
         settings["evolution"] = {"initial_choice": FIRST}
         what += (
             f"; falls and leaps cost, torques come up to {LATE} step late; the best of "
-            f"{FIRST} first individuals each; cycles no shorter than an animal's of its mass"
+            f"{FIRST} first individuals each"
         )
+    if not (body.skeleton or body.bounces):
+        settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
+        what += "; cycles no shorter than an animal's of its mass"
     return settings, (what, "high", why)
 
 

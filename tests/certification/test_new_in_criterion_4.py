@@ -67,5 +67,5 @@ def test_new_disturbances_of_imported_bodies():
     for robot in (few_feet(BIPED)[0], four_feet(BIPED)[0]):
         assert robot["rollout"]["latency"] >= EXAMINED.latency
         assert not {"masses", "slope"} & set(robot["rollout"])
-    character = dataclasses.replace(BIPED, skeleton=True)
-    assert "rollout" not in four_feet(character)[0]
+    ant = dataclasses.replace(BIPED, rotor=30.0)
+    assert "rollout" not in four_feet(ant)[0]
