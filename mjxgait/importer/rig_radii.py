@@ -17,6 +17,10 @@ SKINNED = 8
 """Least number of vertices that determine the thickness of a bone's part."""
 SLIMMEST, POINTS = 0.5, 9
 """Share of its radius to which a limb is made slimmer; points along a bone that stand for it."""
+FOLDED = 0.85
+"""Share of the way between two parts with one between them, at rest, that their radii may fill: a
+shin comes nearer to the hip when the knee bends.
+"""
 
 
 def radii_of(plan: Plan) -> list[float]:
@@ -92,6 +96,8 @@ def slimmer(plan: Plan, hinges: Sequence[Sequence[Hinge]], radii: Sequence[float
         if near:
             continue
         gap = apart(shapes[bone], shapes[other])
+        if one == above[above[two]] or two == above[above[one]]:
+            gap *= FOLDED
         both = gap / (radii[bone] + radii[other])  # between two legs, each gives way
         share = both if other in legs else (gap - radii[other]) / radii[bone]
         slim[bone] = min(slim[bone], radii[bone] * max(share, SLIMMEST))

@@ -26,6 +26,10 @@ from mjxgait.importer.stance import (
 )
 from mjxgait.importer.stand_test import Held, hold
 
+TOUCH, GIVE = 0.2, 0.01
+"""The floor's impedance at first touch, and depth in hip heights at which it reaches MuJoCo's usual
+0.95. At the usual first 0.9 the floor kicks a foot that barely touches, and loaded feet flicker.
+"""
 SINK = 0.0005
 """m, initial depth of the feet in the floor, about as deep as they rest."""
 STRAIGHT = 0.97
@@ -176,6 +180,7 @@ def _try(
     drop(trial, q)
     _keep_stops(trial, q)
     stance = stance_of(trial, q)
+    trial.spec.geom("floor").solimp[:3] = (TOUCH, 0.95, GIVE * stance.hip)
     drive = plan_drive(trial, q, stance, planar, notes, stronger)
     feet = lay_soles(trial, stance, planar, notes)
     guard_parts(trial, stance, notes)

@@ -106,6 +106,15 @@ def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path
     assert told(imported, "own inertia")
 
 
+def test_the_floor_gives_at_first_touch(tmp_path):
+    """A hundredth of the hip height; with MuJoCo's usual impedance loaded feet flicker."""
+    for kind, text in (("urdf", BIPED), ("xml", QUADRUPED)):
+        creature, _ = bring(tmp_path, text, kind)
+        floor = creature.model.geom("floor").solimp
+        assert floor[:2].tolist() == [0.2, 0.95]
+        assert floor[2] == pytest.approx(0.01 * creature.frame.hip_height, rel=0.15)
+
+
 def motionless(creature: Creature, gains: dict[str, float]) -> Champion:
     """A gait whose only pose is the stance."""
     return pose_champion(creature, np.tile(creature.joints.stand, (2, 1)), gains)

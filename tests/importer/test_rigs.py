@@ -25,7 +25,7 @@ from mjxgait.importer import ImportChoices, Imported, import_model
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_hinges import Hinge, hinges_of
-from mjxgait.importer.rig_radii import radii_of, slimmer
+from mjxgait.importer.rig_radii import FOLDED, apart, points_along, radii_of, slimmer
 from mjxgait.importer.rigged import model_of
 
 FEET = ["LeftHand", "RightHand", "LeftHock", "RightHock"]
@@ -313,6 +313,21 @@ def test_legs_are_slimmer_than_the_space_between_other_parts(tmp_path: Path):
     fatter = [20.0 if name.endswith("Shin") else 2.0 for name in names]
     slim = dict(zip(names, slimmer(plan, hinges_of(plan), fatter), strict=True))
     assert slim["LeftShin"] == 10.0, "half as thick at least"
+
+
+def test_a_shin_is_slimmer_than_the_way_to_the_hip(tmp_path: Path):
+    """At rest the two touch, and the knee bends: a panda walked with its shins in its hips."""
+    file = tmp_path / "dog.bvh"
+    file.write_text(bvh(DOG))
+    plan = Plan(1, rig_of_bvh(file))
+    names, hinges = plan.rig.names, hinges_of(plan)
+    shin, hips = names.index("LeftShin"), names.index("Hips")
+    way = apart(points_along(plan, shin), points_along(plan, hips))
+    fat = [0.01 for _ in names]
+    fat[hips], fat[shin] = 0.5 * way, 0.5 * way
+    slim = slimmer(plan, hinges, fat)
+    assert slim[hips] == fat[hips], "the trunk stays as it is"
+    assert slim[shin] + fat[hips] == pytest.approx(FOLDED * way)
 
 
 def test_an_imported_character_has_slim_legs(tmp_path: Path):
