@@ -40,7 +40,7 @@ WHIPPED = 4.0
 Most robots that fail a single criterion fail by the speed of their fastest part, a foot.
 """
 LEAPS = 9.0
-"""Weight of time in the air, three times the default, of robots on more than two feet: those that
+"""Weight of time in the air, three times the default, of bodies on more than two feet: those that
 leap off all feet at once do not begin to walk, and late torques fell them.
 """
 MANY = 6
@@ -56,8 +56,8 @@ ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
 CROSSED, NEAR = 12.0, 0.667
-"""Weight of parts within each other, three times the default, of a character on one foot or two:
-its thick thighs and tail are close. Weight of its distance: what a longer episode adds to it must
+"""Weight of parts within each other, three times the default, of a character: its thick thighs, tail
+and chest are close. Weight of distance on one foot or two: what a longer episode adds to it must
 not outweigh them.
 """
 FLICKER, LEISURE = 3.0, 0.65
@@ -120,8 +120,9 @@ def train_table(body: Traits, notes: Notes) -> Settings:
         choice = (f"{choice[0]}; parts within each other cost", *choice[1:])
     elif body.skeleton:
         settings["fitness"]["speed"] = LEISURE
-        settings["fitness"]["weights"]["patter"] = FLICKER
-        choice = (f"{choice[0]}; feet that flicker cost; {LEISURE:g} body lengths/s", *choice[1:])
+        settings["fitness"]["weights"] |= {"patter": FLICKER, "overlap": CROSSED}
+        what = f"feet that flicker and parts within each other cost; {LEISURE:g} body lengths/s"
+        choice = (f"{choice[0]}; {what}", *choice[1:])
     notes.guess("train", *choice)
     table: Settings = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings
     if not body.symmetric:

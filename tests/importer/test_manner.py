@@ -84,6 +84,7 @@ def test_a_character_walks_at_leisure_and_pays_for_feet_that_flicker():
     """On two feet none was seen to flicker, and slower it would stand on one."""
     robot, character = (told(steps=False, skeleton=skeleton)[0] for skeleton in (False, True))
     assert character.fitness.weights.patter > robot.fitness.weights.patter == 0.0
+    assert character.fitness.weights.overlap == 3 * robot.fitness.weights.overlap
     least = CertificateConfig().progress.speed
     assert 1.2 * least < character.fitness.speed < robot.fitness.speed
     standing, character = (told(skeleton=skeleton)[0].fitness for skeleton in (False, True))
