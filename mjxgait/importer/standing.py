@@ -26,7 +26,7 @@ from mjxgait.importer.stance import (
 )
 from mjxgait.importer.stand_test import Held, hold
 
-TOUCH, GIVE = 0.2, 0.01
+TOUCH, GIVE = 0.35, 0.01
 """The floor's impedance at first touch, and depth in hip heights at which it reaches MuJoCo's usual
 0.95. At the usual first 0.9 the floor kicks a foot that barely touches, and loaded feet flicker.
 """

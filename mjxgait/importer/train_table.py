@@ -60,6 +60,10 @@ CROSSED, NEAR = 12.0, 0.667
 and chest are close. Weight of distance on one foot or two: what a longer episode adds to it must
 not outweigh them.
 """
+SLIDES = 20.0
+"""Weight of feet that slide, twice the default, of characters on more than two feet: on a floor that
+gives at first touch a paw bears weight while it still moves.
+"""
 FLICKER, LEISURE = 3.0, 0.65
 """Weight of feet that lose the floor for moments, of characters on more than two feet: their mass
 rests on small paws and hooves, which shake. And their target speed in body lengths per second: at
@@ -120,8 +124,8 @@ def train_table(body: Traits, notes: Notes) -> Settings:
         choice = (f"{choice[0]}; parts within each other cost", *choice[1:])
     elif body.skeleton:
         settings["fitness"]["speed"] = LEISURE
-        settings["fitness"]["weights"] |= {"patter": FLICKER, "overlap": CROSSED}
-        what = f"feet that flicker and parts within each other cost; {LEISURE:g} body lengths/s"
+        settings["fitness"]["weights"] |= {"patter": FLICKER, "slip": SLIDES, "overlap": CROSSED}
+        what = f"feet that flicker or slide and parts within each other cost; {LEISURE:g} body lengths/s"
         choice = (f"{choice[0]}; {what}", *choice[1:])
     notes.guess("train", *choice)
     table: Settings = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings

@@ -111,7 +111,7 @@ def test_the_floor_gives_at_first_touch(tmp_path):
     for kind, text in (("urdf", BIPED), ("xml", QUADRUPED)):
         creature, _ = bring(tmp_path, text, kind)
         floor = creature.model.geom("floor").solimp
-        assert floor[:2].tolist() == [0.2, 0.95]
+        assert floor[:2].tolist() == [0.35, 0.95]
         assert floor[2] == pytest.approx(0.01 * creature.frame.hip_height, rel=0.15)
 
 

@@ -85,6 +85,7 @@ def test_a_character_walks_at_leisure_and_pays_for_feet_that_flicker():
     robot, character = (told(steps=False, skeleton=skeleton)[0] for skeleton in (False, True))
     assert character.fitness.weights.patter > robot.fitness.weights.patter == 0.0
     assert character.fitness.weights.overlap == 3 * robot.fitness.weights.overlap
+    assert character.fitness.weights.slip == 2 * robot.fitness.weights.slip
     least = CertificateConfig().progress.speed
     assert 1.2 * least < character.fitness.speed < robot.fitness.speed
     standing, character = (told(skeleton=skeleton)[0].fitness for skeleton in (False, True))
