@@ -25,7 +25,7 @@ from mjxgait.creature import overlap
 from mjxgait.distributed import evolve as board
 from mjxgait.distributed.jobs import Programs
 from mjxgait.distributed.scheduler import LocalBackend
-from mjxgait.experiments.ablation import findings, rows
+from mjxgait.experiments.ablation import findings, measures
 from mjxgait.training import loop
 from mjxgait.training.prescreen import Prescreen
 
@@ -42,10 +42,10 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """
     _default(monkeypatch, CertificateConfig, build(CertificateConfig, SHORTER, "short"))
     _default(monkeypatch, StressConfig, StressConfig(starts=4, seconds=1.0, long=2.0))
-    monkeypatch.setattr(rows, "SECONDS", 0.5)
-    monkeypatch.setattr(rows, "STARTS", 2)
+    monkeypatch.setattr(measures, "SECONDS", 0.5)
+    monkeypatch.setattr(measures, "STARTS", 2)
     monkeypatch.setattr(findings, "RESAMPLES", 499)
-    for module in (mjxgait.processes, rows):
+    for module in (mjxgait.processes, measures):
         monkeypatch.setattr(module, "process_per_core", _one_thread)
     monkeypatch.setattr(subprocess, "run", _run_here(subprocess.run))
     monkeypatch.chdir(tmp_path)
