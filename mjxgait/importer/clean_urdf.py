@@ -86,14 +86,15 @@ def _check_tree(robot: ET.Element, path: Path) -> None:
         parent, child = (_end(joint, side) for side in ("parent", "child"))
         for link in (parent, child):
             if link not in links:
+                name = joint.get("name", "")
                 raise UserError(
-                    f'{path}: joint "{joint.get("name", "")}" is on link "{link}", which the file does '
-                    f"not have; {did_you_mean(link, links)}"
+                    f'{path}: joint "{name}" is on link "{link}", which the file does not have; '
+                    f"{did_you_mean(link, links)}"
                 )
         if child in above:
             raise UserError(
-                f'{path}: link "{child}" is the child of two joints, which closes a loop; only trees '
-                "can be simulated here, so take one of them out"
+                f'{path}: link "{child}" is the child of two joints, which closes a loop; only '
+                "trees can be simulated here, so take one of them out"
             )
         above[child] = parent
     _check_rooted(above, path)

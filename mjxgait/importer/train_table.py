@@ -125,8 +125,8 @@ def train_table(body: Traits, notes: Notes) -> Settings:
     elif body.skeleton:
         settings["fitness"]["speed"] = LEISURE
         settings["fitness"]["weights"] |= {"patter": FLICKER, "slip": SLIDES, "overlap": CROSSED}
-        what = f"feet that flicker or slide and parts within each other cost; {LEISURE:g} body lengths/s"
-        choice = (f"{choice[0]}; {what}", *choice[1:])
+        what = "feet that flicker or slide and parts within each other cost"
+        choice = (f"{choice[0]}; {what}; {LEISURE:g} body lengths/s", *choice[1:])
     notes.guess("train", *choice)
     table: Settings = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings
     if not body.symmetric:
@@ -143,12 +143,12 @@ def four_feet(body: Traits) -> tuple[Settings, Choice]:
     fitness: Settings = {"weights": {"foot_speed": WHIPPED}}
     what = "other starts in each generation; small mutations; feet that swing too fast cost"
     why = "of what robots' joints do at random little stands, and much of it whips"
+    settings: Settings = {"fitness": fitness}
     if body.bounces:
         fitness["contact"] = 0.0
         what += "; feet are down that bear weight"
         why += ": its motors are heavier to turn than all of it"
-    settings: Settings = {"fitness": fitness}
-    if not body.bounces:
+    else:
         fitness["weights"] |= {"fall": 1.0, "airborne": LEAPS}
         settings["rollout"] = {"latency": LATE}
         settings["evolution"] = {"initial_choice": FIRST}
@@ -156,9 +156,9 @@ def four_feet(body: Traits) -> tuple[Settings, Choice]:
             f"; falls and leaps cost, torques come up to {LATE} step late; the best of "
             f"{FIRST} first individuals each"
         )
-    if not (body.skeleton or body.bounces):
-        settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
-        what += "; cycles no shorter than an animal's of its mass"
+        if not body.skeleton:
+            settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
+            what += "; cycles no shorter than an animal's of its mass"
     return settings, (what, "high", why)
 
 

@@ -1,4 +1,7 @@
-"""Measures of each run of a study: C MuJoCo evaluates all variants alike, whatever they evolved for."""
+"""Measures of each run of a study.
+
+C MuJoCo evaluates all variants alike, whatever fitness they evolved for.
+"""
 
 import dataclasses
 import functools
