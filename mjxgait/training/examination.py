@@ -13,23 +13,26 @@ from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.stress import Stress, stress
 from mjxgait.champion import Champion
 from mjxgait.config.schema import ExaminationConfig
-from mjxgait.config.tables import STORED, Finite, Flag, Index, Text
+from mjxgait.config.tables import STORED, Flag, Index, Text
+from mjxgait.errors import listed
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import Experiment
 from mjxgait.training.folder import Line, read_records, write_lines
 from mjxgait.training.prescreen import Prescreen
 
+SURER = 4
+"""Factor on the starts of a validation after an examination that failed."""
+
 
 @dataclasses.dataclass(frozen=True)
 class _Exam:
-    """Schema of a line. margin: on the draw to choose on, of a champion without a certificate."""
+    """Schema of a line."""
 
     __pydantic_config__ = STORED
     generation: Index
     champion: Text
     passed: Flag
-    margin: Finite | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,10 +49,9 @@ class Exams:
         """Return whether the champion of this fingerprint has failed up to this generation."""
         return any(line["champion"] == champion for line in self._failures(generation))
 
-    def margin_that_failed(self, generation: int) -> float:
-        """Return the largest margin with which a certificate failed up to this generation."""
-        margins = (line.get("margin") for line in self._failures(generation))
-        return max((margin for margin in margins if margin is not None), default=-np.inf)
+    def any_failed(self, generation: int) -> bool:
+        """Return whether any champion has failed up to this generation."""
+        return bool(self._failures(generation))
 
     def taken(self, generation: int) -> int:
         """Return the number of examinations up to this generation."""
@@ -60,18 +62,11 @@ class Exams:
         before = self._until(generation)
         return before.index(champion) + 1 if champion in before else len(before) + 1
 
-    def add(
-        self, champion: str, generation: int, passed: bool, margin: float | None = None
-    ) -> None:
-        """Record an examination, once for each champion.
-
-        margin: on the draw to choose on, if the certificate failed.
-        """
+    def add(self, champion: str, generation: int, passed: bool) -> None:
+        """Record an examination, once for each champion."""
         if champion in (line["champion"] for line in self._lines()):
             return
         line: Line = {"generation": generation, "champion": champion, "passed": passed}
-        if margin is not None and np.isfinite(margin):
-            line["margin"] = margin
         write_lines(self.path, [*self._lines(), line])
 
     def _failures(self, generation: int) -> list[Line]:
@@ -140,9 +135,9 @@ class Examiner:
     prescreen: Prescreen | None = None
     examines: threading.Event = dataclasses.field(default_factory=threading.Event)
     """Set once a validation has reached the examination, which uses all cores."""
-    _margins: dict[str, float] = dataclasses.field(default_factory=dict)
-    """Upper bound of the margin by fingerprint, of champions that missed it during the run.
-    Validating them again would give the same."""
+    _margins: dict[tuple[str, int], float] = dataclasses.field(default_factory=dict)
+    """Upper bound of the margin by fingerprint and number of starts, of champions that missed it
+    during the run. Validating them again would give the same."""
 
     def early(self, state: EvolutionState) -> Examined | None:
         """Return one of the best with its certificate, if validation is due and it passes.
@@ -170,13 +165,18 @@ class Examiner:
     def _wanted(self, generation: int) -> float:
         """Return the margin required for an examination during the run.
 
-        It is `examination.enough` in the first half of the generations and 0 in the second, and
-        always more than a margin with which a certificate has failed.
+        It is `examination.enough` in the first half of the generations and 0 in the second.
         """
         config = self.experiment.config
-        early = 2 * generation <= config.evolution.generations
-        failed = self.exams.margin_that_failed(generation)
-        return max(config.examination.enough if early else 0.0, float(np.nextafter(failed, np.inf)))
+        return config.examination.enough if 2 * generation <= config.evolution.generations else 0.0
+
+    def _starts(self, generation: int) -> int:
+        """Return the number of starts to choose on: more once a certificate has failed.
+
+        The champion that failed was lucky on the smaller draw, and few attempts are left.
+        """
+        starts = self.experiment.config.examination.draws
+        return starts * SURER if self.exams.any_failed(generation) else starts
 
     def _in_order(self, state: EvolutionState, ranks: list[int]) -> list[tuple[int, float]]:
         """Return the individuals, each with its margin by pre-screening, best first.
@@ -193,14 +193,15 @@ class Examiner:
         """Return a champion with its certificate, if it passes; never validate it twice."""
         config, name = self.experiment.config, champion.fingerprint
         wanted = self._wanted(generation)
-        if self._margins.get(name, np.inf) < wanted or self.exams.failed(name, generation):
+        known = name, self._starts(generation)
+        if self._margins.get(known, np.inf) < wanted or self.exams.failed(name, generation):
             return None
         if self.exams.attempt(name, generation) >= config.examination.attempts:
             return None
-        seen = self._look(champion, wanted, beaten=wanted)
+        seen = self._look(champion, generation, wanted, beaten=wanted)
         if seen.margin >= wanted and (examined := self._examine(seen, hasty=True)).passed:
             return examined
-        self._margins[name] = seen.margin
+        self._margins[known] = seen.margin
         return None
 
     def best(self, state: EvolutionState) -> Examined | None:
@@ -224,13 +225,13 @@ class Examiner:
                 known.append(champion)
                 continue
             beaten = max((seen.margin for seen in waiting), default=-np.inf)
-            seen = self._look(champion, 0.0, min(beaten, 0.0))
+            seen = self._look(champion, generation, 0.0, min(beaten, 0.0))
             if seen.margin < settings.enough:
                 waiting.append(seen)
             elif self._examined(seen, tried) or self._spent(generation):
                 return passed_or_first(tried)
         if not waiting and not tried:
-            waiting = [self._look(champion, np.inf, np.inf) for champion in known[:1]]
+            waiting = [self._look(champion, generation, np.inf, np.inf) for champion in known[:1]]
         for seen in sorted(waiting, key=lambda seen: -seen.margin):
             if tried and (seen.margin < 0 or self._spent(generation)):
                 break
@@ -247,7 +248,7 @@ class Examiner:
         """Return whether the run has no attempt left."""
         return self.exams.taken(generation) >= self.experiment.config.examination.attempts
 
-    def _look(self, champion: Champion, wanted: float, beaten: float) -> Seen:
+    def _look(self, champion: Champion, generation: int, wanted: float, beaten: float) -> Seen:
         """Validate the undisturbed walk; if its margin reaches `wanted`, also the disturbed ones.
 
         The disturbed walks stop once a margin of `beaten` is out of reach.
@@ -256,8 +257,7 @@ class Examiner:
         seen = nominal_check(creature, champion)
         margin = seen.margin
         if margin >= wanted:
-            settings = self.experiment.config.examination
-            draw, caution = settings.draws, settings.caution
+            draw, caution = self._starts(generation), self.experiment.config.examination.caution
             rehearsed = rehearse(creature, champion, draw, wanted=beaten, caution=caution)
             margin = min(margin, rehearsed)
         return Seen(champion, seen, margin)
@@ -277,10 +277,17 @@ class Examiner:
             beyond = stress(body, seen.champion, hasty=hasty)
             self.tell("\n".join(beyond.rows()))
         examined = Examined(certificate, seen.champion, beyond)
+        if hasty and not certificate.passed:
+            self.tell(f"Not certified: {_missed(certificate)}.")
         with disk_errors(self.exams.path.parent):
-            margin = None if certificate.passed else seen.margin
-            self.exams.add(name, generation, examined.passed, margin)
+            self.exams.add(name, generation, examined.passed)
         return examined
+
+
+def _missed(certificate: Certificate) -> str:
+    """Return the measures that fail, with their thresholds."""
+    rows = [row[1:] for row in certificate.rows() if row[-1] == "FAIL"]
+    return listed([f"{name} {value} ({limit} required)" for name, value, limit, _ in rows], 3)
 
 
 def due(settings: ExaminationConfig, generation: int) -> bool:
