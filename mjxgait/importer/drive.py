@@ -29,6 +29,10 @@ QUICKNESS = 5.0
 
 A slower joint cannot follow a stride.
 """
+SPRAWL = 2.0
+"""Factor on a foot's distance beside a hinge, where that is more than the hip height: how far out the
+weight acts on a sprawling leg. The hinges of upright legs are within half a hip height.
+"""
 SWING = 0.35
 """rad, amplitude at which the torque limit must swing a joint's own inertia at that frequency."""
 LEAST_DAMPING = 0.5
@@ -91,7 +95,8 @@ def plan_drive(
     """
     feet = len(kinematics.feet)
     roles, moves = roles_of(kinematics, q, stance)
-    weight = stronger * kinematics.mass * GRAVITY * stance.hip
+    arms = np.maximum(stance.hip, SPRAWL * _beside(kinematics, stance))
+    weight = stronger * kinematics.mass * GRAVITY * arms
     inertia = _own_inertia(kinematics)
     quick = QUICKNESS**2 * GRAVITY / stance.hip * inertia
     # Arms and the like bear no weight.
@@ -107,6 +112,7 @@ def plan_drive(
     drive = Drive(roles, kp, kd, torque, ranges)
     _add_armature(kinematics, drive, inertia, notes)
     reason = f"weight {kinematics.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
+    reason += "; longer arms where legs sprawl" if (arms > stance.hip).any() else ""
     reason += f", and {stronger:g} times as much, because it sank" if stronger > 1 else ""
     reason += "; more where a joint's own inertia needs it" if (kp == quick).any() else ""
     notes.guess("kp, kd", f"{np.median(kp):.3g}, {np.median(kd):.3g}", "medium", reason)
@@ -157,6 +163,14 @@ def swing_arms(
     if drive.swing:
         arms = listed(list(drive.swing))
         notes.guess("swing", arms, "medium", "arms swing with the leg of the other side")
+
+
+def _beside(kinematics: KinematicModel, stance: Stance) -> np.ndarray:
+    """Return the distance [J] m, level and from a hinge's axis, of the farthest foot on it."""
+    soles = kinematics.sole_points(stance.xpos, stance.xrot)
+    lifts = [kinematics.jacobian(f, sole.mean(0))[:, 2] for f, sole in enumerate(soles)]
+    found: np.ndarray = np.abs(lifts).max(0)
+    return found
 
 
 def _own_inertia(kinematics: KinematicModel) -> np.ndarray:

@@ -24,11 +24,12 @@ LEFT_WORDS, RIGHT_WORDS = (
 """Whole words of a name, as between underscores."""
 ASKEW = 0.5
 """Largest share of the way between the sides along one axis that may lie along the other."""
-CLEARLY, MOSTLY = 1.1, 2.0
+CLEARLY, MOSTLY, NAMED = 1.1, 2.0, 4.0
 """Ratio of the foot swings along the two axes from which the larger one is the walking axis.
 
-The first holds where symmetry does not separate the axes, the second where it, or the names of left
-and right parts, speak for the other axis.
+The first holds where symmetry does not separate the axes, the second where it speaks for the other
+axis, the third where names of left and right parts do: lifting and bending a leg that sprawls swing
+its foot sideways.
 """
 SHANK = 0.25
 """Share of a leg's length from which its last part is a shank, not a foot."""
@@ -87,7 +88,7 @@ def _axis(kinematics: KinematicModel, q: np.ndarray) -> tuple[str, Confidence, s
     farther = max(along_x, along_y) / max(min(along_x, along_y), 1e-9)
     swung = f"the hinges swing the feet {min(farther, 99):.1f} times as far along {name}"
     if alike["x"] == alike["y"]:
-        if farther <= MOSTLY and (facing := _faces(kinematics)) is not None:
+        if farther <= NAMED and (facing := _faces(kinematics)) is not None:
             return ("x", "y")[int(np.abs(facing).argmax())], "high", SIDES
         if farther > CLEARLY:
             return name, "high" if alike["x"] else "medium", swung

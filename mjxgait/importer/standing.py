@@ -32,8 +32,8 @@ TOUCH, GIVE = 0.35, 0.01
 """
 SINK = 0.0005
 """m, initial depth of the feet in the floor, about as deep as they rest."""
-STRAIGHT = 0.97
-"""Straightness from which legs count as straight."""
+FOLDED, STRAIGHT = 0.4, 0.97
+"""Straightness below which legs count as folded up, and from which as straight."""
 STRONGER = (2.0, 4.0)
 """Factors of strength for a body that sinks, tried in this order."""
 SEARCHED = "a search over leg bends"
@@ -158,13 +158,20 @@ def _best_pose(
     tried: list[tuple[str, Candidate]] = []
     for what, pose in poses:
         tried.append((what, attempt(pose())))
-        # Legs that are straight out have no length left to step with: such a pose is only the
-        # second choice.
-        if tried[-1][1].held.stands and search.stretch(tried[-1][1].q) < STRAIGHT:
+        if tried[-1][1].held.stands and _can_step(search, tried[-1][1].q):
             break
     return max(
-        tried, key=lambda pair: pair[1].held.score - 0.2 * (search.stretch(pair[1].q) > STRAIGHT)
+        tried, key=lambda pair: pair[1].held.score - 0.2 * (not _can_step(search, pair[1].q))
     )
+
+
+def _can_step(search: Search, q: np.ndarray) -> bool:
+    """Return whether the legs are neither straight nor folded up in a pose [J].
+
+    Straight ones have no length left to step with, and folded ones do not swing. Such a pose is
+    only the second choice.
+    """
+    return FOLDED < search.stretch(q) < STRAIGHT
 
 
 def _try(

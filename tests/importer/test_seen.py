@@ -9,6 +9,7 @@ from importer.models import BIPED, QUADRUPED
 
 from mjxgait.api.bodies import write_folder
 from mjxgait.certification.check_body import check_body
+from mjxgait.certification.feasibility import feasibility
 from mjxgait.creature import Creature, load_creature
 from mjxgait.importer import ImportChoices, Imported, import_model, stance
 from mjxgait.importer.orient import _named_front
@@ -105,6 +106,39 @@ def test_names_of_sides_say_the_front_where_the_body_does_not(tmp_path, sides):
     creature, imported = bring(tmp_path, animal(legs))
     np.testing.assert_allclose(front(creature), [0, -1, 0], atol=1e-6)
     assert "the names of left and right parts" in imported.notes.text()
+
+
+def sprawling(name: str, side: int, x: float) -> str:
+    """A leg that reaches out to one side: a hinge that swings it, and two that lift and bend it."""
+    return (
+        f'<body name="{name}" pos="{x} {0.05 * side} 0">'
+        f'<joint name="{name}_swing" axis="0 0 1" range="-25 25"/>'
+        f'<joint name="{name}_lift" axis="1 0 0" range="-40 40"/>'
+        f'<geom type="capsule" fromto="0 0 0 0 {0.2 * side} .02" size=".02"/>'
+        f'<body name="{name}_shin" pos="0 {0.2 * side} .02">'
+        f'<joint name="{name}_knee" axis="1 0 0" range="-50 50"/>'
+        f'<geom type="capsule" fromto="0 0 0 0 {0.05 * side} -.14" size=".015"/></body></body>'
+    )
+
+
+@pytest.mark.usefixtures("a_short_search")
+def test_legs_that_sprawl_walk_ahead_and_are_strong_enough_for_their_reach(tmp_path):
+    """Lifting and bending swing these feet sideways, twice as far as the third hinge does ahead.
+
+    The hinges carry the weight on arms longer than the hip height.
+    """
+    legs = "".join(
+        sprawling(f"{name}_{row}", side, 0.12 * row)
+        for row in (-1, 0, 1)
+        for name, side in (("left", 1), ("right", -1))
+    )
+    creature, imported = bring(tmp_path, animal(legs))
+    np.testing.assert_allclose(front(creature), [1, 0, 0], atol=1e-6)
+    assert "longer arms where legs sprawl" in imported.notes.text()
+    assert feasibility(creature).limits == []
+    lift = creature.joints.names.index("left_0_lift")
+    swing = creature.joints.names.index("left_0_swing")
+    assert creature.gains.torque_limit[lift] > 1.5 * creature.gains.torque_limit[swing]
 
 
 def test_a_hinge_mirrors_another_wherever_its_anchor_lies_on_its_axis(tmp_path):
@@ -239,6 +273,27 @@ def test_legs_that_the_file_folds_are_let_down_alike(tmp_path):
     for joint in ("hip", "knee"):
         alike = [angles[f"{leg}_{joint}"] for leg in legs]
         np.testing.assert_allclose(alike, alike[0], atol=0.03)
+
+
+@pytest.mark.usefixtures("a_short_search")
+def test_legs_folded_up_beneath_the_trunk_are_no_stance(tmp_path):
+    """In the file's pose the body rests on its feet, with its shins beneath its thighs."""
+    legs = "".join(
+        f'<body name="{name}" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 1 0" range="-90 90"/>'
+        f'<joint name="{name}_roll" axis="1 0 0" range="-30 30"/>'
+        f'<geom type="capsule" fromto="0 0 0 -.2 0 0" size=".015"/><body name="{name}_shin" pos="-.2 0 0">'
+        f'<joint name="{name}_knee" axis="0 1 0" range="-20 150"/>'
+        f'<geom type="capsule" fromto="0 0 0 .2 0 -.08" size=".015"/></body></body>'
+        for name, (x, y) in {
+            "FL": (0.2, 0.2),
+            "FR": (0.2, -0.2),
+            "BL": (-0.15, 0.2),
+            "BR": (-0.15, -0.2),
+        }.items()
+    )
+    creature, imported = bring(tmp_path, animal(legs))
+    assert imported.stands
+    assert creature.frame.hip_height > 0.15
 
 
 def test_a_knee_without_limits_bends_to_the_side_it_stands_on(tmp_path):
