@@ -1,4 +1,4 @@
-"""Whether a body can walk at all, before anything is evolved: strength, reach, room for a stride.
+"""Whether a body can walk and be examined, before anything is evolved: strength, reach, shapes.
 
 A prediction from statics and kinematics; it proves nothing. The thresholds are the certificate's.
 """
@@ -9,9 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.criteria import SHAPELESS
 from mjxgait.certification.statics import REACHED, Load, Statics
 from mjxgait.creature import Creature
 from mjxgait.creature.textbook import Leg
+from mjxgait.reference.measure import dimensions
 from mjxgait.tasks.walk.gaits import stride_limit
 
 DUTY = 0.5
@@ -52,11 +54,13 @@ class Feasibility:
 
     rest: load in standing of joints that belong to no single leg. speed: body lengths/s that its
     longest strides give, as often as an animal of its mass may stride. legs: those with joints.
+    shapeless: share of the mass of parts without a shape.
     """
 
     legs: tuple[LegRoom, ...]
     rest: Load
     speed: float
+    shapeless: float
     config: CertificateConfig
 
     @property
@@ -69,7 +73,7 @@ class Feasibility:
     @property
     def limits(self) -> list[Limit]:
         """What it lacks, the worst for a walk first; empty if it lacks nothing."""
-        found = (self._weak(), self._hanging(), self._short(), self._slow())
+        found = (self._weak(), self._hanging(), self._short(), self._slow(), self._unseen())
         return [limit for limit in found if limit is not None]
 
     def lines(self) -> list[str]:
@@ -144,6 +148,15 @@ class Feasibility:
             "Widen `range` of the legs' joints in creature.toml.",
         )
 
+    def _unseen(self) -> Limit | None:
+        if self.shapeless <= SHAPELESS:
+            return None
+        return (
+            f"Parts with {self.shapeless:.0%} of its mass have no shape, so that their overlap "
+            f"cannot be examined; more than {SHAPELESS:.0%} is never certified.",
+            "Import the model with its meshes, or add geoms in creature.xml.",
+        )
+
 
 def _of_limit(load: Load) -> str:
     return f"{load.share:.0%} ({load.joint})" if load.joint else "none"
@@ -168,7 +181,7 @@ def feasibility(creature: Creature) -> Feasibility:
     )
     own = [joint for leg in legs for joint in leg.joints]
     rest = statics.standing(np.setdiff1d(np.arange(len(creature.joints.names)), own))
-    found = Feasibility(rooms, rest, np.inf, config)
+    found = Feasibility(rooms, rest, np.inf, dimensions(creature).shapeless, config)
     if not rooms:
         return found
     speed = found.stride * frame.hip_height * stride_limit(frame.mass) / frame.body_length

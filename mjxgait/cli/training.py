@@ -13,6 +13,7 @@ from mjxgait.api.make import attempts, evolve
 from mjxgait.api.multi_seed import evolve_zoo
 from mjxgait.cli.options import parsed
 from mjxgait.cli.train_options import TrainOptions, options_of
+from mjxgait.config.layers import shipped_creatures
 from mjxgait.config.schema import Config, ExaminationConfig
 from mjxgait.config.tables import build, merge, not_none
 from mjxgait.controllers.expressions.written import with_expressions
@@ -102,6 +103,8 @@ def _check_resumed(options: TrainOptions, config: Config, default: Config) -> No
 
 def _until_certified(options: TrainOptions, creature: Creature, config: Config) -> int:
     """Evolve new runs until one is certified; return the exit code."""
+    if not options.quiet:
+        print(*_limits(options, creature, config), sep="", end="")
     code = 0
     for number, (folder, one) in enumerate(attempts(options.out, creature, config, options.tries)):
         if number and not options.quiet:
@@ -110,6 +113,15 @@ def _until_certified(options: TrainOptions, creature: Creature, config: Config) 
         if code or Run(folder).certified:
             break
     return code
+
+
+def _limits(options: TrainOptions, creature: Creature, config: Config) -> list[str]:
+    """Return what a body of the user's lacks for a walk, a line each."""
+    if config.use.task != "walk" or options.env in shipped_creatures():
+        return []
+    from mjxgait.certification.feasibility import feasibility
+
+    return [" ".join(limit) + "\n" for limit in feasibility(creature).limits]
 
 
 def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Config) -> int:

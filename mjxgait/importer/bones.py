@@ -76,7 +76,10 @@ def _has_shape(body: mujoco.MjsBody) -> bool:
 
 
 def _bone(body: mujoco.MjsBody) -> Bar | None:
-    """Return the capsule of a part; of the trunk between the joints that are farthest apart."""
+    """Return the capsule of a part; of the trunk between the joints that are farthest apart.
+
+    A trunk with one joint has it through its centre of mass.
+    """
     parts = _placed(body, np.eye(4))
     ends = [
         _moved(place @ _transform(child), child.joints[0].pos)
@@ -86,10 +89,14 @@ def _bone(body: mujoco.MjsBody) -> Bar | None:
     ]
     middle = sum(part.mass * _moved(place, part.ipos) for part, place in parts if part.mass)
     middle /= _mass(body)
-    start = body.joints[0].pos
-    pairs = [(start, end) for end in ends or [2 * middle - start]]
-    if body.joints[0].type == mujoco.mjtJoint.mjJNT_FREE:
-        pairs = list(itertools.combinations(ends, 2)) or [(middle, middle)]
+    is_trunk = body.joints[0].type == mujoco.mjtJoint.mjJNT_FREE
+    if is_trunk and len(ends) > 1:
+        pairs = list(itertools.combinations(ends, 2))
+    elif is_trunk:
+        pairs = [(end, 2 * middle - end) for end in ends or [middle]]
+    else:
+        start = body.joints[0].pos
+        pairs = [(start, end) for end in ends or [2 * middle - start]]
     a, b = max(pairs, key=lambda two: float(np.linalg.norm(two[1] - two[0])))
     length = float(np.linalg.norm(b - a))
     if ends and length < SHORT:

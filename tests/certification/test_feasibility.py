@@ -1,5 +1,6 @@
 """Predictions before anything is evolved: strength, reach, room for strides."""
 
+import copy
 import dataclasses
 
 import mujoco
@@ -46,6 +47,16 @@ def test_a_dog_with_a_fifth_of_its_torque_is_too_weak():
     ((said, remedy),) = feasibility(dataclasses.replace(dog, gains=gains)).limits
     assert said.startswith('"front_left_knee" and 3 more are up to 35% too weak for its weight')
     assert "`torque_limit` in creature.toml" in remedy
+
+
+def test_a_body_of_which_little_can_be_seen_is_never_certified(tiny: Creature):
+    model = copy.copy(tiny.model)
+    trunk = np.flatnonzero(model.geom_bodyid == tiny.trunk)
+    model.geom_bodyid[trunk] = 0
+    ((said, remedy),) = feasibility(dataclasses.replace(tiny, model=model)).limits
+    share = model.body_mass[tiny.trunk] / model.body_mass.sum()
+    assert said.startswith(f"Parts with {share:.0%} of its mass have no shape")
+    assert "meshes" in remedy
 
 
 def test_the_weight_is_shared_by_the_feet(bent: Creature):

@@ -1,18 +1,16 @@
 """Meshes that MuJoCo cannot read, and parts without any shape."""
 
+import functools
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from importer.models import BIPED
+from importer.models import BIPED, bring
 from trimesh.exchange.dae import export_collada
 
-from mjxgait.api.bodies import write_folder
-from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.importer import ImportChoices, Imported, import_model, stance
 from mjxgait.importer.meshes import convert, converted
 from mjxgait.reference.measure import dimensions
 
@@ -22,24 +20,14 @@ BLOCK = trimesh.creation.box(
 MILLIMETRES = b'<asset><unit name="millimeter" meter="0.001"/>'
 
 
-@pytest.fixture(autouse=True)
-def a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stance, "FIRST", 60)
-    monkeypatch.setattr(stance, "ROUNDS", 4)
+pytestmark = pytest.mark.usefixtures("a_short_search")
+bring_urdf = functools.partial(bring, kind="urdf")
 
 
 def written(kind: str, mesh: trimesh.Trimesh = BLOCK) -> bytes:
     data = export_collada(mesh) if kind == "dae" else mesh.export(file_type=kind)
     assert isinstance(data, bytes)
     return data
-
-
-def bring(folder: Path, text: str) -> tuple[Creature, Imported]:
-    file = folder / "robot.urdf"
-    file.write_text(text, encoding="utf-8")
-    imported = import_model(file, ImportChoices(apart=False))
-    write_folder(folder / "mine", imported)
-    return load_creature(folder / "mine"), imported
 
 
 def size_of(data: bytes) -> np.ndarray:
@@ -83,7 +71,7 @@ def test_feet_get_the_soles_of_their_collada_meshes(tmp_path: Path):
     for name in names:
         (meshes / f"{name}.dae").write_bytes(written("dae"))
     text = re.sub(r"<collision>.*?</collision>", "", BIPED).replace("package://biped/", "")
-    creature, imported = bring(tmp_path, text)
+    creature, imported = bring_urdf(tmp_path, text)
     for words in ("mesh and its shapes dropped", "capsules for", "sphere added"):
         assert words not in imported.notes.text(), words
     hulls = creature.model.geom_dataid[creature.model.geom_dataid >= 0]
@@ -95,7 +83,7 @@ def test_feet_get_the_soles_of_their_collada_meshes(tmp_path: Path):
 def test_a_mesh_that_cannot_be_read_is_named_as_in_the_model(tmp_path: Path):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "trunk.dae").write_bytes(b"<COLLADA/>")
-    _, imported = bring(tmp_path, BIPED.replace("package://biped/", ""))
+    _, imported = bring_urdf(tmp_path, BIPED.replace("package://biped/", ""))
     assert 'shapes dropped "meshes/trunk.dae"' in imported.notes.text()
 
 
@@ -111,7 +99,7 @@ def test_meshes_beside_a_package_s_models_are_found(tmp_path: Path, model: str, 
     if model != "urdf":
         (tmp_path / "package.xml").touch()
     text = BIPED.replace("package://biped/meshes/", reference)
-    _, imported = bring(tmp_path / model, text)
+    _, imported = bring_urdf(tmp_path / model, text)
     assert "trunk.dae" not in imported.notes.text()
 
 
@@ -119,7 +107,7 @@ def test_a_mesh_outside_of_the_package_is_not_read(tmp_path: Path):
     (tmp_path / "robot" / "mine").mkdir(parents=True)
     (tmp_path / "robot" / "trunk.dae").write_bytes(written("dae"))
     text = BIPED.replace("package://biped/meshes/", "../")
-    _, imported = bring(tmp_path / "robot" / "mine", text)
+    _, imported = bring_urdf(tmp_path / "robot" / "mine", text)
     assert 'mesh "../trunk.dae" dropped' in imported.notes.text()
 
 
@@ -132,8 +120,8 @@ def test_a_trunk_without_mass_gets_the_capsule_of_the_link_fixed_to_it(tmp_path:
         '<link name="nothing"/><joint name="fixed" type="fixed"><parent link="nothing"/>'
         f'<child link="{name[1]}"/><origin xyz="0 0 0.1" rpy="0 0 0.5"/></joint>'
     )
-    plain, _ = bring(tmp_path, text)
-    creature, imported = bring(tmp_path, re.sub(r"(<robot[^>]*>)", rf"\1{first}", text))
+    plain, _ = bring_urdf(tmp_path, text)
+    creature, imported = bring_urdf(tmp_path, re.sub(r"(<robot[^>]*>)", rf"\1{first}", text))
     assert "capsules for nothing" in imported.notes.text()
     sizes = [c.model.geom_size[c.model.geom_bodyid == 1] for c in (plain, creature)]
     np.testing.assert_allclose(*sizes, rtol=1e-3)
@@ -142,7 +130,7 @@ def test_a_trunk_without_mass_gets_the_capsule_of_the_link_fixed_to_it(tmp_path:
 def test_parts_without_a_shape_get_capsules_along_their_bones(tmp_path: Path):
     """A body that nobody can see is in no picture, and none of its parts stands in another."""
     text = re.sub(r"<(visual|collision)>.*?</\1>", "", BIPED)
-    creature, imported = bring(tmp_path, text)
+    creature, imported = bring_urdf(tmp_path, text)
     assert "capsules for" in imported.notes.text()
     model = creature.model
     seen = {model.body(model.geom_bodyid[g]).name for g in np.flatnonzero(model.geom_group < 3)}
@@ -150,6 +138,30 @@ def test_parts_without_a_shape_get_capsules_along_their_bones(tmp_path: Path):
     assert parts - seen == {"left_hip", "right_hip"}, "the crosses between trunk and thighs"
     assert 0 < dimensions(creature).shapeless < 0.1
     assert np.flatnonzero(model.geom_conaffinity).size == model.ngeom - len(seen) + 1
+
+
+def test_a_trunk_on_one_joint_gets_a_capsule_through_its_weight(tmp_path: Path):
+    """Some humanoids carry arms and head on a trunk that turns on one waist."""
+    legs = "".join(
+        f'<body name="{side}_thigh" pos="0 {y} 0"><joint name="{side}_hip" axis="0 1 0" range="-60 60"/>'
+        f'<geom type="capsule" fromto="0 0 0 0 0 -.2" size=".04"/><body name="{side}_shin" pos="0 0 -.2">'
+        f'<joint name="{side}_knee" axis="0 1 0" range="0 90"/><geom type="capsule" fromto="0 0 0 0 0 -.2" '
+        'size=".03"/><geom type="box" pos=".03 0 -.22" size=".09 .04 .02"/></body></body>'
+        for side, y in (("left", 0.1), ("right", -0.1))
+    )
+    text = (
+        '<mujoco><compiler angle="degree"/><worldbody><body name="trunk" pos="0 0 .6"><freejoint/>'
+        '<inertial pos="0 0 .2" mass="12" diaginertia=".2 .2 .1"/><body name="waist">'
+        '<joint name="waist" axis="0 0 1" range="-40 40"/><geom type="sphere" size=".08"/>'
+        f"{legs}</body></body></worldbody></mujoco>"
+    )
+    creature, imported = bring(tmp_path, text)
+    assert "capsules for trunk" in imported.notes.text()
+    assert dimensions(creature).shapeless == 0
+    model = creature.model
+    (bone,) = np.flatnonzero(model.geom_bodyid == creature.trunk)
+    np.testing.assert_allclose(model.geom_pos[bone], [0, 0, 0.2], atol=1e-6)
+    assert model.geom_size[bone, 1] == pytest.approx(0.2)
 
 
 def test_a_mass_that_only_an_unreadable_mesh_tells_is_refused(tmp_path: Path):
@@ -163,4 +175,4 @@ def test_a_mass_that_only_an_unreadable_mesh_tells_is_refused(tmp_path: Path):
         count=1,
     )
     with pytest.raises(UserError, match="a mass that only its mesh tells"):
-        bring(tmp_path, text)
+        bring_urdf(tmp_path, text)

@@ -1,33 +1,14 @@
 """What a person sees in a body, an import sees too: its front, its sides, what is no leg."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
-from importer.models import BIPED, QUADRUPED
+from importer.models import BIPED, QUADRUPED, bring
 
-from mjxgait.api.bodies import write_folder
 from mjxgait.certification.check_body import check_body
 from mjxgait.certification.feasibility import feasibility
-from mjxgait.creature import Creature, load_creature
-from mjxgait.importer import ImportChoices, Imported, import_model, stance
+from mjxgait.creature import Creature
 from mjxgait.importer.orient import _named_front
-
-
-@pytest.fixture
-def a_short_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The standing pose is sought a sixth as long, where it is not what a test looks at."""
-    monkeypatch.setattr(stance, "FIRST", 60)
-    monkeypatch.setattr(stance, "ROUNDS", 4)
-
-
-def bring(folder: Path, text: str, kind: str = "xml") -> tuple[Creature, Imported]:
-    file = folder / f"model.{kind}"
-    file.write_text(text, encoding="utf-8")
-    imported = import_model(file, ImportChoices(apart=False))
-    write_folder(folder / "mine", imported)
-    return load_creature(folder / "mine"), imported
 
 
 def front(creature: Creature) -> np.ndarray:

@@ -371,6 +371,19 @@ def test_next_steps_are_printed_before_plots_that_may_be_interrupted(
     assert said.index("Next:") < said.index("Drawing") < said.index("mjxgait plot")
 
 
+@pytest.mark.parametrize("words", [(), ("--quiet",)])
+def test_what_a_body_of_the_user_lacks_is_told_before_it_is_evolved(
+    words: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch
+):
+    mine = tmp_path / "mine"
+    shutil.copytree(STOOL, mine)
+    toml = mine / "creature.toml"
+    toml.write_text(re.sub(r"torque_limit = \S+", "torque_limit = 0.5", toml.read_text()))
+    monkeypatch.setattr("mjxgait.cli.training.evolve", lambda *given: given[-2]() is not None)
+    said = said_by(capsys, "train", "--env", mine, "--out", tmp_path / "run", *words, code=130)
+    assert ("too weak for its weight" in said) == (not words)
+
+
 def test_a_folder_with_another_run_is_left_alone(
     finished: tuple[Path, str], capsys: pytest.CaptureFixture
 ):
