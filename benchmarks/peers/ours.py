@@ -21,7 +21,8 @@ from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.training import loop
 from mjxgait.training.advance import Generations
 from mjxgait.training.checkpoint import Checkpoints
-from mjxgait.training.examination import Examiner, Exams
+from mjxgait.training.examination import Examiner
+from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Batch, Experiment, build_experiment, one_row, row_of
 from mjxgait.training.folder import EXAMS
 from mjxgait.training.generation import evolution_of, next_starts

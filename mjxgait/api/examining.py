@@ -12,7 +12,7 @@ from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, write_text
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.examination import Exams
+from mjxgait.training.exams import Exams
 from mjxgait.training.folder import CERTIFICATE, EXAMS, command
 
 

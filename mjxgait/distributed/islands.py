@@ -23,7 +23,8 @@ from mjxgait.evolution.state import EvolutionState, stop_reason
 from mjxgait.training.advance import versions
 from mjxgait.training.checkpoint import Checkpoints, Packed
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.examination import Examined, Examiner, Exams, why_ended
+from mjxgait.training.examination import Examined, Examiner, why_ended
+from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import (
     CHAMPION,

@@ -19,7 +19,8 @@ from mjxgait.plugins.user_code import load_all, loaded
 from mjxgait.processes import one_per_core
 from mjxgait.training.advance import versions
 from mjxgait.training.checkpoint import Checkpoints
-from mjxgait.training.examination import Examiner, Exams, due, why_ended
+from mjxgait.training.examination import Examiner, due, why_ended
+from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.folder import CERTIFICATE, EXAMS, command, kept_champion, open_run
 from mjxgait.training.loop import conclude

@@ -22,7 +22,8 @@ from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.training.advance import Generations, versions
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.examination import Examined, Examiner, Exams, Validation, why_ended
+from mjxgait.training.examination import Examined, Examiner, Validation, why_ended
+from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Batch, Experiment, Step, build_experiment, one_row
 from mjxgait.training.folder import (
     BODY,

@@ -26,7 +26,7 @@ from mjxgait.errors import UserError
 from mjxgait.inspect.sections import island_facts
 from mjxgait.rendering.curves import columns
 from mjxgait.rendering.walk import record_walk
-from mjxgait.training.examination import Exams
+from mjxgait.training.exams import Exams
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,

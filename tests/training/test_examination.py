@@ -31,8 +31,9 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.training import examination, loop, stages
-from mjxgait.training.examination import Examiner, Exams, due
+from mjxgait.training.examination import Examiner, due
 from mjxgait.training.examination import Validation as RunLooks
+from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import (
     CERTIFICATE,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mjxgait.training.examination import Exams
+from mjxgait.training.exams import Exams
 
 
 @pytest.fixture

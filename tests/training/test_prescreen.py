@@ -17,7 +17,8 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import load_creature
 from mjxgait.plugins import resolve_config
 from mjxgait.training import prescreen as prescreen
-from mjxgait.training.examination import Examiner, Exams
+from mjxgait.training.examination import Examiner
+from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.prescreen import Prescreen, prescreen_of, tried_settings
 
