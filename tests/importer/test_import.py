@@ -115,6 +115,34 @@ def test_the_floor_gives_at_first_touch(tmp_path):
         assert floor[2] == pytest.approx(0.01 * creature.frame.hip_height, rel=0.15)
 
 
+def kick(stiffness: str, drop: float) -> float:
+    """Greatest force in N of a floor on a ball of 1 kg that comes down on it with a tenth of its weight.
+
+    stiffness: attributes of the floor. drop: m.
+    """
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep=".005"/><worldbody><geom type="plane" size="0 0 .1" priority="1" '
+        f'{stiffness}/><body pos="0 0 {0.05 + drop}"><freejoint/><geom size=".05" mass="1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    data, greatest = mujoco.MjData(model), 0.0
+    data.xfrc_applied[1, 2] = 0.9 * 9.81
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+        greatest = max(greatest, float(data.qfrc_constraint[2]))
+    return greatest
+
+
+@pytest.mark.usefixtures("a_short_search")
+@pytest.mark.parametrize("drop", [0.0005, 0.002])
+def test_the_floor_does_not_kick_a_foot_that_barely_touches_it(tmp_path, drop: float):
+    creature, _ = bring(tmp_path, QUADRUPED)
+    floor = creature.model.geom("floor")
+    spring = f'solref="{" ".join(map(str, floor.solref))}"'
+    usual = kick(spring, drop)
+    assert kick(f'{spring} solimp="{" ".join(map(str, floor.solimp))}"', drop) < 0.5 * usual
+
+
 def motionless(creature: Creature, gains: dict[str, float]) -> Champion:
     """A gait whose only pose is the stance."""
     return pose_champion(creature, np.tile(creature.joints.stand, (2, 1)), gains)
