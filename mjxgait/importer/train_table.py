@@ -43,6 +43,10 @@ LEAPS = 9.0
 """Weight of time in the air, three times the default, of bodies on more than two feet: those that
 leap off all feet at once do not begin to walk, and late torques fell them.
 """
+LENIENT = 1.0
+"""Leniency with short walks of robots on more than two feet. Without it some only stand in all
+generations, because a first short walk in bad style scores less.
+"""
 MANY = 6
 """Hinges per leg above which few random poses stand.
 
@@ -158,7 +162,8 @@ def four_feet(body: Traits) -> tuple[Settings, Choice]:
         )
         if not body.skeleton:
             settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
-            what += "; cycles no shorter than an animal's of its mass"
+            fitness["leniency"] = LENIENT
+            what += "; style counts little in short walks; cycles no shorter than an animal's of its mass"
     return settings, (what, "high", why)
 
 

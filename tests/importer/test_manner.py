@@ -41,8 +41,8 @@ def shortest_cycle(config: Config) -> float:
 
 
 def test_a_robot_on_four_feet_is_evolved_as_the_shipped_duck_is():
-    """Late torques, falls and leaps that cost, many first individuals; feet may not whip, and
-    cycles are no hastier than an animal's. All else is as usual, and all of it in an ant with
+    """Late torques, falls and leaps that cost, many first individuals; feet may not whip, short
+    walks are judged leniently, and cycles are no hastier than an animal's. All else is as usual, and all of it in an ant with
     motors heavier than itself: with them its feet flickered more. A character has its usual cycles.
     """
     robot, usual = told(steps=False)[0], Config()
@@ -52,7 +52,8 @@ def test_a_robot_on_four_feet_is_evolved_as_the_shipped_duck_is():
     assert (weights.fall, weights.airborne) == (1.0, 3 * plain.airborne)
     own = {"foot_speed": weights.foot_speed, "fall": weights.fall, "airborne": weights.airborne}
     assert weights == dataclasses.replace(plain, **own)
-    assert robot.fitness == dataclasses.replace(usual.fitness, weights=weights)
+    assert robot.fitness == dataclasses.replace(usual.fitness, weights=weights, leniency=1.0)
+    assert character.fitness.leniency == ant.fitness.leniency == usual.fitness.leniency == 0
     assert (robot.rollout.latency, robot.evolution.initial_choice) == (1, 4)
     assert (ant.rollout.latency, ant.evolution.initial_choice) == (0, 1)
     assert (character.rollout, character.evolution) == (robot.rollout, robot.evolution)
@@ -77,7 +78,8 @@ def test_a_body_of_many_hinges_is_first_of_all_to_stay_up():
     assert told(hinges=12)[0] == told(hinges=13)[0]
     bouncing, _ = told(steps=False, legs=4, hinges=25, rotor=30.0)
     plain = dataclasses.replace(many.fitness.weights, fall=0.0, airborne=3.0)
-    assert bouncing.fitness == dataclasses.replace(many.fitness, contact=0.0, weights=plain)
+    own = {"contact": 0.0, "leniency": 0.0, "weights": plain}
+    assert bouncing.fitness == dataclasses.replace(many.fitness, **own)
 
 
 def test_a_character_walks_at_leisure_and_pays_for_feet_that_flicker():

@@ -11,6 +11,7 @@ from mjxgait.config.tables import (
     STRICT,
     Finite,
     Flag,
+    Fraction,
     NonNegative,
     Positive,
     Whole,
@@ -174,6 +175,8 @@ class WalkConfig:
         generation in which the best individuals stay up; 0: full size from the first generation on.
       style_ramp: generations over which the style terms (all but distance, alive, foot_height and
         fall) grow to their full weight.
+      leniency: 0: the style terms count with the covered share of the wanted distance, so that a
+        short walk in bad style scores about as little as standing; 1: with that share squared.
       weights: weight of each term.
       wish: further targets: a speed, a gait, a turn, a posture.
     """
@@ -185,5 +188,6 @@ class WalkConfig:
     contact: Annotated[NonNegative, SHAPE] = 0.002
     hardening: Annotated[Whole, SHAPE] = 0
     style_ramp: Whole = 0
+    leniency: Annotated[Fraction, ADDED] = 0.0
     wish: TargetConfig = dataclasses.field(default_factory=TargetConfig)
     weights: Weights = dataclasses.field(default_factory=Weights)

@@ -62,7 +62,8 @@ def fitness_terms(
         jnp.isfinite(enough), jnp.clip(stats.forward / length / enough, 0.0, 1.0), 1.0
     )
     values["alive"] *= STANDING + (1 - STANDING) * walked
-    return {name: values[name] * (walked if name in STYLE else 1.0) for name in TERMS}
+    style = walked * (1.0 - config.leniency + config.leniency * walked)
+    return {name: values[name] * (style if name in STYLE else 1.0) for name in TERMS}
 
 
 def terms_under(weights: Weights) -> tuple[str, ...]:

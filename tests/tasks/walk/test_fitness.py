@@ -138,6 +138,17 @@ def test_style_penalties_scale_with_the_share_of_the_target(body: Creature):
     assert terms["distance"] == pytest.approx(2.0)
 
 
+def test_with_leniency_they_scale_with_that_share_squared(body: Creature):
+    """A short walk costs less, and one over the whole distance the same."""
+    half = terms_of(body, {"tilt": 120.0}, speed=0.9, leniency=0.5)["tilt"]
+    lenient = terms_of(body, {"tilt": 120.0}, speed=0.9, leniency=1.0)
+    assert half == pytest.approx(0.12 * (4 / 9 + 16 / 81) / 2, rel=1e-4)
+    assert lenient["tilt"] == pytest.approx(0.12 * 16 / 81, rel=1e-4)
+    assert lenient["distance"] == pytest.approx(2.0)
+    whole = {"tilt": 120.0, "forward": 4.5}
+    assert terms_of(body, whole, speed=0.9, leniency=1.0) == terms_of(body, whole, speed=0.9)
+
+
 @pytest.mark.parametrize(("forward", "counts"), [(0.0, 0.25), (2.0, 0.25 + 0.75 * 4 / 9), (9.0, 1)])
 def test_alive_reward_grows_with_the_distance_walked(body, forward, counts):
     """The target distance is 4.5 m. Standing still must not score higher than walking."""
