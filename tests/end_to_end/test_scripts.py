@@ -77,6 +77,7 @@ def played(folder: Path) -> list[str]:
 
 
 FORMS: dict[str, Given] = {
+    "animals.py": lambda to: [str(to / "animals")],
     "accelerator.py": lambda folder: [
         *(*STOOLS, "--out", "out", "--engines", "ours", "--lanes", "2"),
         *("--seconds", "0.1", "--passes", "0.1"),
