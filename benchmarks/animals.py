@@ -95,16 +95,26 @@ def corners(
     return legs
 
 
-def around(
-    count: int, radius: float, links: Callable[[], list[Link]], name: str, half: bool = False
-) -> str:
+def around(count: int, radius: float, leg: list[Link], half: bool = False) -> str:
     """Return alike legs around a trunk, each turned outward. half: the first by half a step."""
     legs = ""
     for i in range(count):
         turn = 360 * (i + 0.5 * half) / count
         at = (radius * math.cos(math.radians(turn)), radius * math.sin(math.radians(turn)), 0.0)
-        legs += limb(f"{name}{i}", at, links(), turn)
+        legs += limb(f"leg{i}", at, leg, turn)
     return legs
+
+
+def row(
+    draw: Callable[[int], str], count: int, gap: float, name: str, hinge: str, bend: float
+) -> str:
+    """Return parts behind each other, each on an upright hinge. bend: its range in degrees."""
+    behind = ""
+    for i in reversed(range(count)):
+        own = draw(i) + behind
+        joined = joint(f"{hinge}{i}", Z, -bend, bend) + own
+        behind = part(f"{name}{i}", (-gap, 0, 0), joined) if i else own
+    return behind
 
 
 def beetle() -> tuple[float, str]:
@@ -142,14 +152,13 @@ def mouse() -> tuple[float, str]:
 
 
 def star5() -> tuple[float, str]:
-    def leg() -> list[Link]:
-        lift = (("yaw", Z, -40, 40), ("lift", Y, -45, 45))
-        return [
-            Link("up", lift, (0.14, 0, 0.03), 0.02, 0.2),
-            Link("down", (("knee", Y, -45, 45),), (0.05, 0, -0.2), 0.017, 0.15),
-        ]
+    lift = (("yaw", Z, -40, 40), ("lift", Y, -45, 45))
+    leg = [
+        Link("up", lift, (0.14, 0, 0.03), 0.02, 0.2),
+        Link("down", (("knee", Y, -45, 45),), (0.05, 0, -0.2), 0.017, 0.15),
+    ]
 
-    return 0.18, solid("cylinder", (0.12, 0.035), 1.5) + around(5, 0.1, leg, "leg")
+    return 0.18, solid("cylinder", (0.12, 0.035), 1.5) + around(5, 0.1, leg)
 
 
 def centipede10() -> tuple[float, str]:
@@ -161,12 +170,9 @@ def centipede10() -> tuple[float, str]:
             lower = capsule(knee, (0, sign * 0.11, -0.11), 0.009, 0.03)
             leg = Link("leg", swing, knee, 0.01, 0.05, lower)
             inner += limb(f"s{i}{side}", (0, sign * 0.045, 0), [leg])
-        if i < 4:
-            spine = joint(f"spine{i + 1}", Z, -25, 25)
-            inner += part(f"seg{i + 1}", (-0.15, 0, 0), spine + segment(i + 1))
         return inner
 
-    return 0.13, segment(0)
+    return 0.13, row(segment, 5, 0.15, "seg", "spine", 25)
 
 
 def raptor() -> tuple[float, str]:
@@ -224,14 +230,13 @@ def child() -> tuple[float, str]:
 
 
 def tripod() -> tuple[float, str]:
-    def leg() -> list[Link]:
-        hip = (("yaw", Z, -50, 50), ("lift", Y, -50, 50))
-        return [
-            Link("hip", hip, (0.18, 0, -0.05), 0.025, 0.4),
-            Link("shank", (("knee", Y, -60, 60),), (0.06, 0, -0.28), 0.02, 0.3),
-        ]
+    hip = (("yaw", Z, -50, 50), ("lift", Y, -50, 50))
+    leg = [
+        Link("hip", hip, (0.18, 0, -0.05), 0.025, 0.4),
+        Link("shank", (("knee", Y, -60, 60),), (0.06, 0, -0.28), 0.02, 0.3),
+    ]
 
-    return 0.34, solid("cylinder", (0.14, 0.05), 2.5) + around(3, 0.12, leg, "leg")
+    return 0.34, solid("cylinder", (0.14, 0.05), 2.5) + around(3, 0.12, leg)
 
 
 def elephant() -> tuple[float, str]:
@@ -271,24 +276,20 @@ def lizard() -> tuple[float, str]:
             inner += limb(f"{'fmh'[i]}{side}", (0, sign * 0.02, 0), leg)
         if i == 0:
             inner += ball((0.08, 0, 0.005), 0.018, 0.03)
-        if i < 3:
-            bend = joint(f"bend{i + 1}", Z, -30, 30)
-            inner += part(f"part{i + 1}", (-0.09, 0, 0), bend + segment(i + 1))
         return inner
 
-    return 0.045, segment(0)
+    return 0.045, row(segment, 4, 0.09, "part", "bend", 30)
 
 
 def spider8() -> tuple[float, str]:
-    def leg() -> list[Link]:
-        lift = (("yaw", Z, -30, 30), ("lift", Y, -40, 40))
-        return [
-            Link("femur", lift, (0.05, 0, 0.025), 0.004, 0.0015),
-            Link("tibia", (("knee", Y, -50, 50),), (0.03, 0, -0.065), 0.003, 0.001),
-        ]
+    lift = (("yaw", Z, -30, 30), ("lift", Y, -40, 40))
+    leg = [
+        Link("femur", lift, (0.05, 0, 0.025), 0.004, 0.0015),
+        Link("tibia", (("knee", Y, -50, 50),), (0.03, 0, -0.065), 0.003, 0.001),
+    ]
 
     trunk = solid("ellipsoid", (0.035, 0.028, 0.018), 0.02) + ball((-0.05, 0, 0.008), 0.024, 0.015)
-    return 0.045, trunk + around(8, 0.03, leg, "leg", half=True)
+    return 0.045, trunk + around(8, 0.03, leg, half=True)
 
 
 BODIES: dict[str, tuple[Callable[[], tuple[float, str]], float]] = {

@@ -50,7 +50,7 @@ def advised(
     if all(criterion.passed for criterion in criteria):
         return {}
     kind = known_task(task)
-    limits = [] if kind and kind.modular else feasibility(creature).limits
+    limits = [] if kind and kind.modular else feasibility(creature).walk_limits
     return {ADVICE: advice(criteria, task, report, limits)}
 
 

@@ -72,8 +72,14 @@ class Feasibility:
 
     @property
     def limits(self) -> list[Limit]:
-        """What it lacks, the worst for a walk first; empty if it lacks nothing."""
-        found = (self._weak(), self._hanging(), self._short(), self._slow(), self._unseen())
+        """What it lacks for a certified walk, the worst first; empty if it lacks nothing."""
+        unseen = self._unseen()
+        return [*self.walk_limits, *([unseen] if unseen else [])]
+
+    @property
+    def walk_limits(self) -> list[Limit]:
+        """What it lacks for a walk, whether or not that can be examined."""
+        found = (self._weak(), self._hanging(), self._short(), self._slow())
         return [limit for limit in found if limit is not None]
 
     def lines(self) -> list[str]:

@@ -67,6 +67,10 @@ def train(arguments: Sequence[str]) -> int:
             print(line)
     if options.tries != 1 and (options.resume or options.runs is not None):
         raise UserError("--tries: for new runs one after another, without --resume and --runs")
+    mine = options.resume is None and options.env not in shipped_creatures()
+    walks = config.use.task == "walk" and not creature.settings.creature.grows
+    if mine and walks and not options.quiet:
+        _tell_limits(creature)
     if options.runs is not None or _is_zoo(options.resume):
         return _several(options, creature, config, default)
     if options.generation is not None and options.resume is None:
@@ -103,8 +107,6 @@ def _check_resumed(options: TrainOptions, config: Config, default: Config) -> No
 
 def _until_certified(options: TrainOptions, creature: Creature, config: Config) -> int:
     """Evolve new runs until one is certified; return the exit code."""
-    if not options.quiet:
-        print(*_limits(options, creature, config), sep="", end="")
     code = 0
     for number, (folder, one) in enumerate(attempts(options.out, creature, config, options.tries)):
         if number and not options.quiet:
@@ -115,13 +117,12 @@ def _until_certified(options: TrainOptions, creature: Creature, config: Config) 
     return code
 
 
-def _limits(options: TrainOptions, creature: Creature, config: Config) -> list[str]:
-    """Return what a body of the user's lacks for a walk, a line each."""
-    if config.use.task != "walk" or options.env in shipped_creatures():
-        return []
+def _tell_limits(creature: Creature) -> None:
+    """Print what a body lacks for a walk that is certified."""
     from mjxgait.certification.feasibility import feasibility
 
-    return [" ".join(limit) + "\n" for limit in feasibility(creature).limits]
+    for limit in feasibility(creature).limits:
+        print(*limit)
 
 
 def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Config) -> int:

@@ -90,13 +90,11 @@ def _bone(body: mujoco.MjsBody) -> Bar | None:
     middle = sum(part.mass * _moved(place, part.ipos) for part, place in parts if part.mass)
     middle /= _mass(body)
     is_trunk = body.joints[0].type == mujoco.mjtJoint.mjJNT_FREE
-    if is_trunk and len(ends) > 1:
-        pairs = list(itertools.combinations(ends, 2))
-    elif is_trunk:
-        pairs = [(end, 2 * middle - end) for end in ends or [middle]]
-    else:
-        start = body.joints[0].pos
-        pairs = [(start, end) for end in ends or [2 * middle - start]]
+    points = (ends if is_trunk else [body.joints[0].pos, *ends]) or [middle]
+    if len(points) == 1:
+        points = [points[0], 2 * middle - points[0]]
+    between = itertools.combinations(points, 2)
+    pairs = list(between) if is_trunk else [(points[0], end) for end in points[1:]]
     a, b = max(pairs, key=lambda two: float(np.linalg.norm(two[1] - two[0])))
     length = float(np.linalg.norm(b - a))
     if ends and length < SHORT:

@@ -140,7 +140,7 @@ class Examiner:
             return None
         if self.exams.attempt(name, generation) >= config.examination.attempts:
             return None
-        seen = self._look(champion, generation, wanted, beaten=wanted)
+        seen = self._look(champion, wanted, beaten=wanted)
         if seen.margin >= wanted and (examined := self._examine(seen, hasty=True)).passed:
             return examined
         self._margins[known] = seen.margin
@@ -167,13 +167,13 @@ class Examiner:
                 known.append(champion)
                 continue
             beaten = max((seen.margin for seen in waiting), default=-np.inf)
-            seen = self._look(champion, generation, 0.0, min(beaten, 0.0))
+            seen = self._look(champion, 0.0, min(beaten, 0.0))
             if seen.margin < settings.enough:
                 waiting.append(seen)
             elif self._examined(seen, tried) or self._spent(generation):
                 return passed_or_first(tried)
         if not waiting and not tried:
-            waiting = [self._look(champion, generation, np.inf, np.inf) for champion in known[:1]]
+            waiting = [self._look(champion, np.inf, np.inf) for champion in known[:1]]
         for seen in sorted(waiting, key=lambda seen: -seen.margin):
             if tried and (seen.margin < 0 or self._spent(generation)):
                 break
@@ -190,7 +190,7 @@ class Examiner:
         """Return whether the run has no attempt left."""
         return self.exams.taken(generation) >= self.experiment.config.examination.attempts
 
-    def _look(self, champion: Champion, generation: int, wanted: float, beaten: float) -> Seen:
+    def _look(self, champion: Champion, wanted: float, beaten: float) -> Seen:
         """Validate the undisturbed walk; if its margin reaches `wanted`, also the disturbed ones.
 
         The disturbed walks stop once a margin of `beaten` is out of reach.
@@ -199,7 +199,8 @@ class Examiner:
         seen = nominal_check(creature, champion)
         margin = seen.margin
         if margin >= wanted:
-            draw, caution = self._starts(generation), self.experiment.config.examination.caution
+            draw = self._starts(int(champion.origin["generation"]))
+            caution = self.experiment.config.examination.caution
             rehearsed = rehearse(creature, champion, draw, wanted=beaten, caution=caution)
             margin = min(margin, rehearsed)
         return Seen(champion, seen, margin)

@@ -116,7 +116,7 @@ def test_the_floor_gives_at_first_touch(tmp_path):
 
 
 def kick(stiffness: str, drop: float) -> float:
-    """Greatest force in N of a floor on a ball of 1 kg that comes down on it with a tenth of its weight.
+    """Greatest force in N of a floor on a ball of 1 kg that touches it with a tenth of its weight.
 
     stiffness: attributes of the floor. drop: m.
     """

@@ -42,8 +42,9 @@ def shortest_cycle(config: Config) -> float:
 
 def test_a_robot_on_four_feet_is_evolved_as_the_shipped_duck_is():
     """Late torques, falls and leaps that cost, many first individuals; feet may not whip, short
-    walks are judged leniently, and cycles are no hastier than an animal's. All else is as usual, and all of it in an ant with
-    motors heavier than itself: with them its feet flickered more. A character has its usual cycles.
+    walks are judged leniently, and cycles are no hastier than an animal's. All else is as usual,
+    and all of it in an ant with motors heavier than itself: with them its feet flickered more. A
+    character has its usual cycles.
     """
     robot, usual = told(steps=False)[0], Config()
     character, ant = (told(steps=False, **own)[0] for own in ({"skeleton": True}, {"rotor": 30.0}))

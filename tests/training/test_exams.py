@@ -38,7 +38,7 @@ def test_a_run_that_goes_back_ignores_later_attempts(exams):
 
 
 def test_whether_any_failed_is_known_by_generation(exams):
-    """Also of a run that goes back, and of an earlier checkout, whose lines have another key."""
+    """Also of a run that goes back, and of an earlier checkout: its lines have another key."""
     assert [exams.any_failed(g) for g in (9, 10, 99)] == [False, True, True]
     exams.path.write_text('{"generation": 3, "champion": "old", "passed": false, "margin": 0.1}\n')
     assert exams.any_failed(3)
