@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from certify_made_up import TOML, XML
 
+from mjxgait.certification.advice import ADVICE, advised
+from mjxgait.certification.criteria import Criterion, at_most
 from mjxgait.certification.feasibility import feasibility
 from mjxgait.certification.statics import IN_A_STEP, Statics
 from mjxgait.config.layers import find_creature, shipped_creatures
@@ -53,10 +55,15 @@ def test_a_body_of_which_little_can_be_seen_is_never_certified(tiny: Creature):
     model = copy.copy(tiny.model)
     trunk = np.flatnonzero(model.geom_bodyid == tiny.trunk)
     model.geom_bodyid[trunk] = 0
-    ((said, remedy),) = feasibility(dataclasses.replace(tiny, model=model)).limits
+    bare = dataclasses.replace(tiny, model=model)
+    ((said, remedy),) = feasibility(bare).limits
     share = model.body_mass[tiny.trunk] / model.body_mass.sum()
     assert said.startswith(f"Parts with {share:.0%} of its mass have no shape")
     assert "meshes" in remedy
+    # The certificate states it as a measure, so its advice does not say it again.
+    unseen = at_most("not examined: mass without a shape / mass", float(share), 0.25)
+    told = advised([Criterion(9, "parts", (unseen,))], "walk", {}, bare)[ADVICE]
+    assert " ".join(told).count("no shape") == 1
 
 
 def test_the_weight_is_shared_by_the_feet(bent: Creature):

@@ -93,7 +93,7 @@ def sprawling(name: str, side: int, x: float) -> str:
     """A leg that reaches out to one side: a hinge that swings it, and two that lift and bend it."""
     return (
         f'<body name="{name}" pos="{x} {0.05 * side} 0">'
-        f'<joint name="{name}_swing" axis="0 0 1" range="-25 25"/>'
+        f'<joint name="{name}_swing" axis="0 0 1" range="-15 15"/>'
         f'<joint name="{name}_lift" axis="1 0 0" range="-40 40"/>'
         f'<geom type="capsule" fromto="0 0 0 0 {0.2 * side} .02" size=".02"/>'
         f'<body name="{name}_shin" pos="0 {0.2 * side} .02">'
@@ -104,7 +104,7 @@ def sprawling(name: str, side: int, x: float) -> str:
 
 @pytest.mark.usefixtures("a_short_search")
 def test_legs_that_sprawl_walk_ahead_and_are_strong_enough_for_their_reach(tmp_path):
-    """Lifting and bending swing these feet sideways, twice as far as the third hinge does ahead.
+    """Lifting and bending swing these feet sideways, three times as far as the third hinge ahead.
 
     The hinges carry the weight on arms longer than the hip height.
     """
