@@ -68,8 +68,7 @@ def train(arguments: Sequence[str]) -> int:
     if options.tries != 1 and (options.resume or options.runs is not None):
         raise UserError("--tries: for new runs one after another, without --resume and --runs")
     mine = options.resume is None and options.env not in shipped_creatures()
-    walks = config.use.task == "walk" and not creature.settings.creature.grows
-    if mine and walks and not options.quiet:
+    if mine and config.use.task == "walk" and not options.quiet:
         _tell_limits(creature)
     if options.runs is not None or _is_zoo(options.resume):
         return _several(options, creature, config, default)

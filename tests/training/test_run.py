@@ -24,7 +24,6 @@ from helpers import STOOL, made_up_evaluate, said_by
 
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
-from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.training import stages
 from mjxgait.training.checkpoint import Checkpoints
@@ -383,16 +382,6 @@ def test_what_a_body_of_the_user_lacks_is_told_before_it_is_evolved(
     monkeypatch.setattr("mjxgait.cli.training.evolve", lambda *given: given[-2]() is not None)
     said = said_by(capsys, "train", "--env", mine, "--out", tmp_path / "run", *words, code=130)
     assert ("too weak for its weight" in said) == (not words)
-
-
-def test_bodies_that_evolve_lack_nothing_beforehand(
-    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch
-):
-    """The body in the folder of such a creature only stands for those that will grow."""
-    shutil.copytree(find_creature("blocks"), tmp_path / "mine")
-    monkeypatch.setattr("mjxgait.cli.training.evolve", lambda *given: given[-2]() is not None)
-    given = ["--env", tmp_path / "mine", "--task", "walk", "--out", tmp_path / "run"]
-    assert "Widen" not in said_by(capsys, "train", *given, code=130)
 
 
 def test_a_folder_with_another_run_is_left_alone(
