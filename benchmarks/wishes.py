@@ -1,11 +1,12 @@
-"""Results of `mjxgait train` with target speeds and gaits, in new processes, one after the other.
+"""Results of `mjxgait train` with targets or styles, in new processes, one after the other.
 
     python benchmarks/wishes.py --json wishes.json
     python benchmarks/wishes.py --env crab --speeds 0.25 1 --gaits --seeds 0 1 --json crab.json
+    python benchmarks/wishes.py --speeds --gaits --styles calm sneaky --json styles.json
 
-For each creature every speed, then every gait for its number of feet; one row each, with the speed
-in C MuJoCo, the gait's name there, stride and duty factor over an animal's, whether the champion is
-certified, and the wall time. Options after `--` go to `train`, such as `-- --cluster HOST:PORT`.
+For each creature every speed, every gait for its number of feet, every style; one row each, with
+the speed in C MuJoCo, the gait's name there, stride and duty factor over an animal's, whether the
+champion is certified, and the wall time. Options after `--` go to `train`, such as `-- --cluster HOST:PORT`.
 """
 
 import argparse
@@ -48,6 +49,7 @@ def main() -> None:
     parser.add_argument("--env", nargs="+", default=ENVS)
     parser.add_argument("--speeds", nargs="*", default=SPEEDS)
     parser.add_argument("--gaits", nargs="*", default=GAITS_ASKED)
+    parser.add_argument("--styles", nargs="*", default=())
     parser.add_argument("--seeds", nargs="+", type=int, default=[0])
     parser.add_argument("--json", type=Path, required=True, help="file for all numbers")
     parser.add_argument("more", nargs="*", help="options of train, after --")
@@ -59,6 +61,7 @@ def main() -> None:
         known = GAITS.get(len(load_creature(env).feet.names), {})
         asked = [["--speed", speed] for speed in options.speeds]
         asked += [["--gait", gait] for gait in options.gaits if gait in (*known, NATURAL)]
+        asked += [["--style", style] for style in options.styles]
         for wish in asked:
             for seed in options.seeds:
                 found.append(run(env, wish, seed, options.more))

@@ -78,7 +78,7 @@ class Weights:
 
 @dataclasses.dataclass(frozen=True)
 class TargetWeights:
-    """Largest cost of missing each target (mjxgait/tasks/walk/fitness.py).
+    """Largest cost of missing each target (mjxgait/tasks/walk/fitness.py); a height's is for 0.1.
 
     Attributes:
       speed: a speed that is not held.

@@ -222,7 +222,10 @@ def hasty(creature: Body, config: WalkConfig, step: float, stats: TargetStats) -
 def missed(
     creature: Body, wish: TargetConfig, step: float, horizon: int, stats: TargetStats
 ) -> dict[str, jax.Array]:
-    """Error [] of each target that is set, from 0 to 1; turns already count in the distance."""
+    """Error [] of each target that is set; turns already count in the distance.
+
+    That of the height is 0.5 at `ROUGH` and grows on; all others stay below 1.
+    """
     lived, frame = jnp.maximum(stats.steps, 1), creature.frame
     found: dict[str, jax.Array] = {}
     if wish.speed is not None:
@@ -233,7 +236,8 @@ def missed(
     height = stats.height / lived
     if wish.height is not None:
         off = height / frame.stand_height - wish.height
-        found["height"] = _half_at(ROUGH["height"], off)
+        # Not flat far from the target, else a trunk that is much too high would never crouch.
+        found["height"] = jnp.abs(off) / (2 * ROUGH["height"])
     if wish.bounce is not None:
         variance = jnp.maximum(stats.height_squared / lived - height**2, 1e-12)
         off = jnp.sqrt(variance) / frame.hip_height - wish.bounce

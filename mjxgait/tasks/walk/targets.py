@@ -11,6 +11,7 @@ from mjxgait.config.schema import Config
 from mjxgait.config.tables import build, merge, not_none, read_toml
 from mjxgait.controllers.key_poses.config import unhurried
 from mjxgait.creature import Creature
+from mjxgait.creature.geometry import DOWN, geom_reach, posed, shapes
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.plugins.registry import resolve_config
 from mjxgait.tasks.walk.criteria import SPARE
@@ -114,7 +115,7 @@ def with_targets(config: Config, creature: Creature, targets: WalkTargets) -> Co
             f"--{', --'.join(TARGETS)} are for walking, and this is to {config.use.task}"
         )
     if targets.style is not None:
-        config = _styled(config, targets.style)
+        config = _styled(creature, config, targets.style)
     if targets.certificate is not None:
         config = _demanded(config, targets.certificate)
     table: dict[str, object] = {}
@@ -216,8 +217,8 @@ def _turn(name: str, rate: float | None) -> dict[str, object]:
     return {"fitness": {"wish": {name: rate}}, "controller": controller}
 
 
-def _styled(config: Config, name: str) -> Config:
-    """Return the settings overlaid with those of a style.
+def _styled(creature: Creature, config: Config, name: str) -> Config:
+    """Return the settings overlaid with those of a style, no lower than the trunk can be.
 
     Raises:
       UserError: there is none of that name and no file, or it holds what is no setting.
@@ -227,7 +228,21 @@ def _styled(config: Config, name: str) -> Config:
     if name not in known and Path(name).suffix != ".toml":
         raise UserError(f"--style {name}: {did_you_mean(name, known)}; or give a FILE.toml")
     path = folder / f"{name}.toml" if name in known else Path(name)
-    return build(type(config), merge(dataclasses.asdict(config), read_toml(path)), str(path))
+    table = merge(dataclasses.asdict(config), read_toml(path))
+    styled = build(type(config), table, str(path))
+    wish, least = styled.fitness.wish, lowest_height(creature)
+    if wish.height is None or wish.height >= least:
+        return styled
+    raised = dataclasses.replace(wish, height=round(least, 3))
+    return dataclasses.replace(styled, fitness=dataclasses.replace(styled.fitness, wish=raised))
+
+
+def lowest_height(creature: Creature) -> float:
+    """Trunk height, in standing heights, at which the level trunk lies on the floor."""
+    model, data = creature.model, posed(creature.model, creature.stand_qpos)
+    own = [g for g in shapes(model) if model.geom_bodyid[g] == creature.trunk]
+    free = min((-geom_reach(model, data, g, DOWN) for g in own), default=0.0)
+    return 1 - max(free, 0.0) / creature.frame.stand_height
 
 
 def _demanded(config: Config, level: str) -> Config:

@@ -182,6 +182,8 @@ def test_fitness_peaks_at_the_target_posture(body: Creature, fitness_of):
 
     assert carried(0.9, 0.02) > max(carried(0.8, 0.02), carried(1.0, 0.02))
     assert carried(0.9, 0.02) > max(carried(0.9, 0.0), carried(0.9, 0.06))
+    far = [carried(height, 0.02) for height in (1.05, 1.0, 0.95, 0.9)]
+    assert np.diff(far).min() > 0.5 * np.diff(far).max(), "hardly a reason to begin to crouch"
     rolls = [walking(roll_squared=1000 * np.radians(deg) ** 2) for deg in (0.0, 6.0, 12.0)]
     worth = [fitness_of(rolling, config) for rolling in rolls]
     assert worth[1] > max(worth[0], worth[2])
@@ -543,6 +545,15 @@ def test_a_low_speed_limit_without_a_target_gives_a_hint(body: Creature):
 def test_every_style_changes_the_settings(body: Creature):
     for name in ("calm", "sneaky", "heavy", "proud", "tired", "hurried"):
         assert with_targets(Config(), body, WalkTargets(style=name)) != Config()
+
+
+def test_a_style_asks_no_trunk_to_be_below_the_floor(body: Creature):
+    crawler = load_creature(data_folder("envs") / "alien")  # its belly lies on the floor
+    heights = [
+        with_targets(Config(), creature, WalkTargets(style="sneaky")).fitness.wish.height
+        for creature in (body, crawler)
+    ]
+    assert heights == [0.85, pytest.approx(1.0, abs=1e-3)]
 
 
 def test_anywhere_trains_on_everything_its_certificate_tests(body: Creature):
