@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 import tomli_w
 
-from mjxgait.config.tables import dump_toml
+from mjxgait.config.tables import dump_toml, merge
 from mjxgait.creature.creature import Creature, vertical_freedom
 from mjxgait.creature.geometry import lowest
 from mjxgait.creature.load import load_creature
@@ -177,6 +177,10 @@ def at_step(creature: Creature, step: float) -> Creature:
 
 Way = Literal["forward", "back", "left", "right"]
 WAYS: tuple[Way, ...] = get_args(Way)
+UNUSUAL = {"task": {"walk": {"fitness": {"leniency": 1.0}}}}
+"""Settings of a walk another way: its first steps are short and in bad style, so a crab that had
+to go sideways stood.
+"""
 Table = Mapping[str, float]
 
 
@@ -202,7 +206,7 @@ def facing(creature: Creature, way: str) -> Creature:
 
 def _turned(settings: CreatureSettings, way: str, axis: np.ndarray) -> CreatureSettings:
     # The defaults apply to walking forward; they may not fit another way.
-    settings = dataclasses.replace(settings, usual=Usual())
+    settings = dataclasses.replace(settings, usual=Usual(), train=merge(settings.train, UNUSUAL))
     balance, stepping, steering = settings.balance, settings.stepping, settings.steering
     x, y, z = np.round(axis, 9) + 0.0
     identity = dataclasses.replace(

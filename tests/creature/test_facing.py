@@ -16,6 +16,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature.scale import WAYS, facing
 from mjxgait.creature.settings import Balance, Steering, Stepping
 from mjxgait.errors import UserError
+from mjxgait.plugins import resolve_config
 from mjxgait.training.folder import create_run, open_run
 
 RNG = np.random.default_rng(5)
@@ -97,6 +98,15 @@ def test_facing_back_reverses_steering_and_keeps_the_mirror(rich: Creature):
 def test_facing_aside_keeps_the_turning_of_the_hips(rich: Creature, way: str):
     """Left of the direction of travel stays left, whatever that direction is."""
     assert facing(rich, way).settings.stepping.turn == rich.settings.stepping.turn
+
+
+@pytest.mark.parametrize("way", ["back", "left", "right"])
+def test_first_steps_another_way_may_be_bad(rich: Creature, way: str):
+    usual, turned = (
+        resolve_config(c.settings.train, c.name).fitness.leniency
+        for c in (rich, facing(rich, way))
+    )
+    assert (usual, turned) == (0.0, 1.0)
 
 
 def test_facing_aside_takes_the_width_as_length(stool: Creature):
