@@ -4,15 +4,15 @@ Give it a body and it returns a walk that holds up in physics, tested in a secon
 
     import mjxgait
 
-    run = mjxgait.train("tall_quadruped", seed=0, out="runs/x", generations=20)
+    run = mjxgait.train("tall_quadruped", seed=0, out="runs/x")
     run.certified, run.certificate["margin"], run.champion.genome["key_poses"]
 
-    mjxgait.refine("duck", "walk.glb", keep=0.7).departure.words   # a hand-made cycle, made to walk
+    mjxgait.refine("crab", "walk.glb", keep=0.5).departure.words   # a hand-made cycle, made to walk
 
     run = mjxgait.train("duck", quiet=True, on_generation=lambda line: print(line["best"]))
     mjxgait.render(run, "walk.webp")      # also export, share, plot; `run` alone in a notebook
     mjxgait.gallery(["runs/x", "runs/y"], "all.html")    # several champions on one page
-    mjxgait.repertoire("duck"); mjxgait.ablate("forced_evolution")   # many runs
+    mjxgait.repertoire("tall_quadruped"); mjxgait.ablate("forced_evolution")   # many runs
     mjxgait.walk(run)                     # columns for pandas: joints, feet, trunk over time
     mjxgait.examine(run)                  # the certificate again, criterion by criterion
     mjxgait.open("runs/x").metrics()      # fitness over generations

@@ -19,7 +19,9 @@ class Command:
 COMMANDS = {
     "train": Command("evolve a walk", "mjxgait train tall_quadruped", creature=True),
     "refine": Command(
-        "make a hand-made cycle walk", "mjxgait refine duck --keys walk.glb", creature=True
+        "make a hand-made cycle walk",
+        "mjxgait refine short_quadruped --keys walk.glb",
+        creature=True,
     ),
     "certify": Command("examine a champion in C MuJoCo", "mjxgait certify RUN"),
     "stress": Command(
@@ -35,7 +37,9 @@ COMMANDS = {
         "mjxgait gallery RUNS --out all.html",
     ),
     "repertoire": Command(
-        "evolve a grid of walks that blend, for games", "mjxgait repertoire duck", creature=True
+        "evolve a grid of walks that blend, for games",
+        "mjxgait repertoire tall_quadruped",
+        creature=True,
     ),
     "view": Command("watch a run as it learns on a local page", "mjxgait view RUN"),
     "import": Command(

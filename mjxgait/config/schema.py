@@ -93,8 +93,8 @@ class RolloutConfig:
       block: most individuals that a machine of a cluster evaluates at once (docs/guide/cluster.md).
       body: its parameters are constants of the compiled program, which is faster, or inputs: then
         another body of the same topology needs no compilation.
-      ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights
-        (docs/reference/ground.md).
+      ground: flat, slope:0.1 (rise per metre), or steps:0.05, bumps:0.05, rough:0.05 (hip heights);
+        docs/reference/ground.md.
     """
 
     __pydantic_config__ = STRICT
