@@ -33,6 +33,8 @@ STOOL = ROOT / "tests" / "data" / "stool"
 TIMES = re.compile(r'"(?:wall_s|steps_per_second|computed_steps|seconds|written)": ?[^,}]*,?')
 """What differs between two runs that are the same."""
 HALF_WRITTEN = re.compile(r"\.(?:tmp|part|partial)$|~$")
+LONGEST = 600.0
+"""Time in s after which a command counts as stuck."""
 SMALL = ["--population", "6", "--generations", "4"]
 STUDY = """
 question = "Does plain PD do as well?"
@@ -134,9 +136,8 @@ class Ended:
 class Interrupter:
     """Runs commands with one interpreter, and sends them signals."""
 
-    def __init__(self, python: str, longest: float = 600.0) -> None:
+    def __init__(self, python: str) -> None:
         self.start = [python, "-P", "-m", "mjxgait"]
-        self.longest = longest
 
     def run(
         self,
@@ -156,12 +157,12 @@ class Interrupter:
             start_new_session=True,
         )
         try:
-            said, _ = process.communicate(timeout=self.longest if after is None else after)
+            said, _ = process.communicate(timeout=LONGEST if after is None else after)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL if after is None else by)
-            said, _ = process.communicate(timeout=self.longest)
+            said, _ = process.communicate(timeout=LONGEST)
             if after is None:
-                return Ended(-1, f"{said}\nno end within {self.longest} s")
+                return Ended(-1, f"{said}\nno end within {LONGEST} s")
             return Ended(None if by == signal.SIGKILL else process.returncode, said)
         return Ended(process.returncode, said)
 

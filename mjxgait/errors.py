@@ -35,7 +35,7 @@ def not_loaded(kind: str, name: str) -> NotLoaded:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return ` (did you mean "x"?)`, or the list of known words when none is near."""
+    """Return `did you mean "x"?`; else the known words, or that none is known."""
     names = sorted(known)
     near = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
     if near:
@@ -57,6 +57,11 @@ def matching(pattern: str, names: Sequence[str], what: str, where: str) -> list[
     if not found:
         raise UserError(f'{where}: no {what} matches "{pattern}"; {did_you_mean(pattern, names)}')
     return found
+
+
+def matches(name: str, patterns: Iterable[str]) -> bool:
+    """Return whether a name matches one of several shell patterns."""
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def listed(names: Sequence[str], most: int = 6) -> str:

@@ -63,16 +63,16 @@ def read_text(path: Path, most: int = MOST_TEXT) -> str:
         raise DamagedFile(f"{path}: not a text file in UTF-8") from None
 
 
-def read_json(path: Path, most: int = MOST_TEXT) -> Any:
+def read_json(path: Path) -> Any:
     """Return the content of a JSON file.
 
     Raises:
       UserError: see `read_text`; or it is no JSON, or refused by `check_tree`.
     """
-    return _parsed(read_text(path, most), str(path))
+    return _parsed(read_text(path), str(path))
 
 
-def read_lines(path: Path, most: int = MOST_LINES) -> list[dict[str, Any]]:
+def read_lines(path: Path) -> list[dict[str, Any]]:
     """Return the objects of a file with one in each line; an empty list if there is no file.
 
     A last line cut off by a kill is left out.
@@ -82,7 +82,7 @@ def read_lines(path: Path, most: int = MOST_LINES) -> list[dict[str, Any]]:
     """
     if not path.exists():
         return []
-    *whole, rest = read_text(path, most).split("\n")
+    *whole, rest = read_text(path, MOST_LINES).split("\n")
     found = [_line(text, f"{path}, line {i}") for i, text in enumerate(whole, 1) if text.strip()]
     with contextlib.suppress(UserError):
         found += [_line(rest, "")] if rest.strip() else []

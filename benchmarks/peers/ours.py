@@ -121,16 +121,18 @@ def as_workload(folder: Path, experiment: Experiment, state: EvolutionState) -> 
 
 
 REPEATS = 30
+GENERATIONS = 8
+"""Length of the run whose own loop is timed."""
 
 
-def overhead(ours: Ours, generations: int = 8) -> dict[str, float]:
+def overhead(ours: Ours) -> dict[str, float]:
     """Return the seconds per generation and the shares of its parts.
 
     Parts: the operators, within the compiled program; on the host, the checkpoint, and all else
     (metrics, champion, screen).
     """
     operators = _operators(ours.experiment)
-    whole, compiled, checkpoint = _host_loop(ours, generations)
+    whole, compiled, checkpoint = _host_loop(ours)
     parts = {"operators": operators, "checkpoint": checkpoint, "log": whole - compiled - checkpoint}
     shares = {f"{name}_share": seconds / whole for name, seconds in parts.items()}
     return {
@@ -180,7 +182,7 @@ class _TimedCheckpoints(Checkpoints):
         self.seconds += time.perf_counter() - began
 
 
-def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
+def _host_loop(ours: Ours) -> tuple[float, float, float]:
     """Return seconds per generation of a run's own loop: in all, compiled part, checkpoints."""
     inside: list[float] = []
 
@@ -193,7 +195,7 @@ def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
     config = ours.experiment.config
     config = dataclasses.replace(
         config,
-        evolution=dataclasses.replace(config.evolution, generations=generations),
+        evolution=dataclasses.replace(config.evolution, generations=GENERATIONS),
         examination=dataclasses.replace(config.examination, every=0),
     )
     experiment = dataclasses.replace(ours.experiment, config=config)

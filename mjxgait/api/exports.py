@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
+from mjxgait.animation import Rate
 from mjxgait.api.run import Place, Run
 from mjxgait.errors import UserError
 from mjxgait.files import path_of
@@ -24,7 +25,7 @@ def export(
     out: Place,
     *,
     onto: Place | None = None,
-    rate: Literal[24, 30, 60] = 30,
+    rate: Rate = 30,
     travelling: bool = False,
     tell: Tell = lambda said: None,
 ) -> Path:
@@ -114,7 +115,10 @@ def _write_page(folder: Path, file: Path, physics: bool, wasm: Path | None) -> s
         )
     if physics:
         return write_physics_page(folder, file, wasm)
-    return (write_driven if repertoire else write_page)(folder, file)
+    if repertoire:
+        write_driven(folder, file)
+        return ""
+    return write_page(folder, file)
 
 
 def plot(

@@ -102,8 +102,8 @@ def write_film(film: Film, wanted: str | None, tell: Tell) -> None:
     from mjxgait.rendering.walk import doubt
 
     generations = _check(film)
-    video.require_writer(film.out)
-    still = film.out.suffix.lower() == ".png"
+    video.require_writer(film.out, stills=True)
+    still = film.out.suffix.lower() == video.STILL
     alone = not (film.top or generations or len(film.runs) > 1)
     seconds = film.seconds or (video.LOOP_SECONDS if still and alone else SECONDS)
     if alone:

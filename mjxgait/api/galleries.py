@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 MOST = 60
 """Largest number of champions on a page."""
 STILLS = (".webp", ".png", ".jpg")
-UNEXAMINED = "Not certified: a study examines no champion"
+UNEXAMINED = "Not certified: a study keeps no certificates"
 SECONDS, FPS = 5.0, 20
 """Length and frames per second of a video."""
 
@@ -105,7 +105,9 @@ def entries_of(folders: Iterable[Path], tell: Tell) -> "list[Entry]":
     if not count:
         raise UserError("gallery: no run has a champion yet; name runs that have ended")
     if count > MOST:
-        raise UserError(f"gallery: {count} champions; a page shows at most {MOST}")
+        raise UserError(
+            f"gallery: {count} champions; a page shows at most {MOST}; name fewer runs or studies"
+        )
     shown = []
     for name, run in zip(_names(runs), runs, strict=True):
         walk = champion_of(run, LOOP_SECONDS).walk

@@ -279,7 +279,10 @@ def evolve(
         ancestors = partial(evolve_ancestors, folder, creature, config, screen.say)
     elsewhere = cluster or config.evolution.islands.count > 1
     if source and elsewhere:
-        raise UserError(f"--from {source}: not for islands, nor on a cluster")
+        raise UserError(
+            f"--from {source}: not for islands, nor on a cluster; leave --from out, or --cluster "
+            "and --evolution.islands.count"
+        )
     if ancestors and config.evolution.islands.count > 1:
         raise UserError("islands begin with drawn individuals; give --evolution.ancestors.runs 0")
     if elsewhere:

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from mjxgait.output import Output
+from mjxgait.output import Output, duration
 
 if TYPE_CHECKING:
     from mjxgait.distributed.jobs import Advanced
@@ -22,4 +22,5 @@ class Progress:
 def pace(done: "Advanced", generations: int) -> str:
     """Return the speed, and the time that the generations ahead may take, in words."""
     left = generations * done.seconds / max(len(done.lines), 1)
-    return f"{done.steps / done.seconds / 1e6:.2f} M steps/s, {left:.0f} s left"
+    speed = done.steps / max(done.seconds, 1e-9) / 1e6
+    return f"{speed:.2f} M steps/s, {duration(left)} left"

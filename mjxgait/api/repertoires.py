@@ -4,11 +4,12 @@ import dataclasses
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
 
+from mjxgait.animation import Rate
 from mjxgait.api.make import load_creature
 from mjxgait.api.progress import Progress, pace
 from mjxgait.api.run import Place
@@ -81,7 +82,7 @@ class RepertoireRequest:
     generations: int | None = None
     seed: int | None = None
     physics: Physics | None = None
-    rate: Literal[24, 30, 60] = 60
+    rate: Rate = 60
     travelling: bool = False
     onto: Path | None = None
     blends: bool = True
@@ -100,7 +101,7 @@ def repertoire(
     population: int | None = None,
     generations: int | None = None,
     seed: int | None = None,
-    rate: Literal[24, 30, 60] = 60,
+    rate: Rate = 60,
     travelling: bool = False,
     onto: Place | None = None,
     blends: bool = True,

@@ -21,6 +21,7 @@ from mjxgait.training.folder import (
     CHAMPION,
     METRICS,
     MOTHERS,
+    columns,
     open_champion,
     open_run,
     read_metrics,
@@ -95,11 +96,11 @@ class Run:
         `mothers`, if logged, is [G, P].
         """
         lines = read_metrics(self.folder / METRICS)
-        names = dict.fromkeys(name for line in lines for name in line)
-        return {
-            name: np.array([np.nan if line.get(name) is None else line[name] for line in lines])
-            for name in names
-        }
+        mothers = [line[MOTHERS] for line in lines if MOTHERS in line]
+        found = columns(lines)
+        if 0 < len(mothers) == len(lines):
+            found[MOTHERS] = np.array(mothers)
+        return found
 
     def _repr_html_(self) -> str:
         """Show the result and the walk in a notebook."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from mjxgait.api.progress import Progress
 from mjxgait.api.run import Place
 from mjxgait.champion import Champion, read_champion
 from mjxgait.config.layers import find_creature
@@ -205,7 +206,7 @@ def finished(planned: Prepared, options: AblateRequest, output: Output) -> Path 
     if not _run(folder, creature, plan, screen, options.cluster, begin):
         output.console.print(f"interrupted; go on with: mjxgait ablate --resume {folder}")
         return None
-    results = measure(folder, plan, screen.measuring)
+    results = measure(folder, plan, screen.examined)
     command = shlex.join(["mjxgait", "ablate", *_repeatable(options)])
     report = write_report(folder, plan, results, read_logs(folder), command)
     output.console.print(report.read_text(encoding="utf-8"))
@@ -269,11 +270,8 @@ def _run(
             return run_study(folder, creature, plan, tell, scheduler, stride)
 
 
-class _Progress:
+class _Progress(Progress):
     """Progress as plain lines; the time left is estimated from the generations so far."""
-
-    def __init__(self, output: Output) -> None:
-        self.output = output
 
     def part(self, group: int, count: int, news: "News") -> None:
         """Report on one program of a study on a cluster, where several run at once."""
@@ -292,14 +290,11 @@ class _Progress:
         if news["note"] and not news["generation"]:
             self.output.say(news["note"])
         left = (news["of"] - news["generation"]) * news["seconds"] / max(news["generations"], 1)
-        speed = news["steps"] / news["seconds"] / 1e6
+        speed = news["steps"] / max(news["seconds"], 1e-9) / 1e6
         self.output.say(
             f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, "
             f"{duration(left)} left"
         )
-
-    def measuring(self, number: int, count: int) -> None:
-        self.output.say(f"{number} of {count} champions examined in C MuJoCo")
 
 
 def _create(folder: Path, study: "Study", creature: Creature) -> None:
@@ -313,7 +308,10 @@ def _open(folder: Path) -> tuple["Study", Creature]:
     from mjxgait.experiments.ablation.plan import Study
 
     if not (folder / STUDY).is_file():
-        raise UserError(f"{folder}: not the folder of a study (it has no {STUDY})")
+        raise UserError(
+            f"{folder}: not the folder of a study (it has no {STUDY}); name the folder that "
+            "`mjxgait ablate` made"
+        )
     table = read_toml(folder / STUDY)
     study = build(Study, table, str(folder / STUDY))
     check_whole(study, table, str(folder / STUDY))

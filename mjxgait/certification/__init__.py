@@ -13,7 +13,12 @@ from mjxgait.certification.certificate import (
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.certification.trials import rehearse
-from mjxgait.certification.validity import outdated, read_certificate, read_stress
+from mjxgait.certification.validity import (
+    outdated,
+    read_certificate,
+    read_stress,
+    stress_in_words,
+)
 from mjxgait.certification.verdict import (
     Verdict,
     criteria_of,
@@ -38,6 +43,7 @@ __all__ = [
     "read_stress",
     "record",
     "rehearse",
+    "stress_in_words",
     "survival",
     "verdict_of",
     "verdict_on",

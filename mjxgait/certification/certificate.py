@@ -115,7 +115,7 @@ class Certificate:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class NominalCheck:
-    """Nominal check: the undisturbed walk, and the criteria that it alone decides, all but 4, 5."""
+    """Nominal check: the undisturbed walk, and the criteria that need no other simulation."""
 
     whole: Recording
     criteria: tuple[Criterion, ...]
@@ -157,7 +157,7 @@ def certify(
     seen: NominalCheck | None = None,
     attempts: int = 1,
 ) -> Certificate:
-    """Examine a champion by all nine criteria, on starts and pushes drawn for it alone.
+    """Examine a champion by all criteria of its task, on starts and pushes drawn for it alone.
 
     Args:
       seen: result of `nominal_check` with the same config, to save the repetition.
@@ -241,11 +241,10 @@ def survival(
     starts: int = 64,
     seconds: float = 22.0,
     seed: int = 0,
-    threads: int = 0,
 ) -> float:
     """Return the share of perturbed starts that stay up to the end and move forward."""
     disturbed = perturbed_starts(creature, starts, np.random.default_rng(seed))
-    outcome = simulate(creature, champion, disturbed, seconds, threads=threads)
+    outcome = simulate(creature, champion, disturbed, seconds)
     return float((outcome.stayed_up & (outcome.travel[:, 0] > 0)).mean())
 
 
@@ -255,7 +254,7 @@ def distance(creature: Creature, champion: Champion, seconds: float) -> float:
 
 
 def push_ladder(
-    creature: Creature, champion: Champion, config: CertificateConfig, threads: int = 0
+    creature: Creature, champion: Champion, config: CertificateConfig
 ) -> dict[float, float]:
     """Return the share that stays up after each larger push, on the draw shared by all champions.
 
@@ -264,7 +263,7 @@ def push_ladder(
     groups = trials.ladder(creature, config, trials.common(config))
     starts = acceptance_of(champion.task, champion.wish).aimed(join(*groups), config)
     fall = acceptance_of(champion.task, champion.wish).fall(config)
-    outcome = simulate(creature, champion, starts, config.seconds, fall=fall, threads=threads)
+    outcome = simulate(creature, champion, starts, config.seconds, fall=fall)
     return dict(
         zip(
             config.pushes.ladder,

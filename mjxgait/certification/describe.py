@@ -215,12 +215,16 @@ def mean_stance(window: Recording, parts: int) -> np.ndarray:
     return share / np.maximum(seen, 1)
 
 
-def footfall_diagram(window: Recording, parts: int = 20) -> list[str]:
+PARTS = 20
+"""Parts of a stride in a footfall diagram."""
+
+
+def footfall_diagram(window: Recording) -> list[str]:
     """Return a string per foot, with a character for each part of the stride.
 
     `#`: mostly standing. `.`: mostly swinging.
     """
-    return ["".join("#" if s > 0.5 else "." for s in foot) for foot in mean_stance(window, parts).T]
+    return ["".join("#" if s > 0.5 else "." for s in foot) for foot in mean_stance(window, PARTS).T]
 
 
 def footfall_phases(window: Recording) -> np.ndarray:

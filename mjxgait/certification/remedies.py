@@ -288,17 +288,17 @@ PHYSICS = (
 TARGETS = (
     Entry(
         "off the speed of *",
-        "It misses the speed that was asked for by {v:.0%}; {t:.0%} is allowed.",
+        "It misses the target speed by {v:.0%}; {t:.0%} is allowed.",
         "Ask for another --speed, or raise --fitness.wish.weights.speed.",
     ),
     Entry(
         "footfalls of a *",
-        "Its feet fall in another order than that of the gait that was asked for.",
+        "Its feet fall in another order than that of the target gait.",
         "Raise --fitness.wish.weights.gait, or ask for another --gait; natural is an animal's.",
     ),
     Entry(
         "off the commanded heading (deg)",
-        "It is {v:.0f} degrees off the heading that was asked for; {t:.0f} are allowed.",
+        "It is {v:.0f} degrees off the commanded heading; {t:.0f} are allowed.",
         "Ask for slower turns: --turn or --steer.",
     ),
     *(

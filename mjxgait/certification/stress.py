@@ -9,6 +9,7 @@ Letters: `S` simulations.
 
 import copy
 import dataclasses
+import json
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -83,12 +84,24 @@ class Stress:
         lines = [
             f"{t.name:24} {t.share:>4.0%}  {'pass' if t.passed else 'FAIL'}" for t in self.trials
         ]
-        verdict = "It walks anywhere." if self.passed else "It does not walk anywhere yet."
-        return [*lines, verdict]
+        return [*lines, self.verdict]
+
+    @property
+    def verdict(self) -> str:
+        """Sentence on whether the champion walks anywhere."""
+        if not self.passed:
+            return "It does not walk anywhere yet."
+        if self.config != StressConfig():
+            return "It passes, but by other settings than those of `mjxgait stress`."
+        return "It walks anywhere."
 
     def document(self) -> dict[str, object]:
         """Return the content of `stress.json`."""
         return {"schema": 1, "passed": self.passed} | dataclasses.asdict(self)
+
+    def to_json(self) -> str:
+        """Return the text of `stress.json`."""
+        return json.dumps(self.document(), indent=2) + "\n"
 
 
 def stress(
@@ -96,7 +109,6 @@ def stress(
     champion: Champion,
     config: StressConfig | None = None,
     tell: Callable[[str], object] = lambda name: None,
-    threads: int = 0,
     hasty: bool = False,
 ) -> Stress:
     """Test a walking champion beyond the certificate, one disturbance at a time.
@@ -109,9 +121,12 @@ def stress(
       UserError: the task is not `walk`.
     """
     if champion.task != "walk":
-        raise UserError(f"this champion's task is {champion.task}: only a walk is stressed")
+        raise UserError(
+            f"this champion's task is {champion.task}: only a walk is stressed; `mjxgait certify` "
+            "examines it"
+        )
     config, found = config or StressConfig(), []
-    for name, tried in _trials(creature, champion, config, threads):
+    for name, tried in _trials(creature, champion, config):
         tell(name)
         done = [_done(creature, outcome) for outcome in tried()]
         share = float(np.concatenate(done).mean())
@@ -122,7 +137,7 @@ def stress(
 
 
 def _trials(
-    creature: Creature, champion: Champion, config: StressConfig, threads: int
+    creature: Creature, champion: Champion, config: StressConfig
 ) -> Iterator[tuple[str, Callable[[], list[Outcome]]]]:
     """Yield the name of each trial and the function that simulates it."""
     rng = common(CertificateConfig()).generator
@@ -131,14 +146,14 @@ def _trials(
     def walked(
         starts: Starts, body: Creature = creature, seconds: float = config.seconds
     ) -> Callable[[], list[Outcome]]:
-        return lambda: [simulate(body, champion, starts, seconds, threads=threads)]
+        return lambda: [simulate(body, champion, starts, seconds)]
 
     def bumps() -> list[Outcome]:
         floors = [creature.on(f"rough:{config.bumps:g}@{i}") for i in range(FLOORS)]
         shares = [plain.rows(np.arange(i, len(plain), FLOORS)) for i in range(FLOORS)]
         # Low-hanging parts may brush a bump.
         return [
-            simulate(floor, champion, some, config.seconds, fall=Fall(touch=False), threads=threads)
+            simulate(floor, champion, some, config.seconds, fall=Fall(touch=False))
             for floor, some in zip(floors, shares, strict=True)
             if len(some)
         ]

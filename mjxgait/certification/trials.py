@@ -133,7 +133,11 @@ def simulate(
 
 
 def steering_criteria(
-    creature: Creature, champion: Champion, config: CertificateConfig, draw: Draw, threads: int
+    creature: Creature,
+    champion: Champion,
+    config: CertificateConfig,
+    draw: Draw,
+    threads: int = 0,
 ) -> tuple[Criterion, ...]:
     """Evaluate drawn commands from perturbed starts; empty if the task has none."""
     acceptance, step = acceptance_of(champion.task, champion.wish), creature.model.opt.timestep
@@ -159,7 +163,6 @@ def rehearse(
     champion: Champion,
     count: int,
     config: CertificateConfig | None = None,
-    threads: int = 0,
     wanted: float = -np.inf,
     caution: float = 0.0,
 ) -> float:
@@ -194,14 +197,14 @@ def rehearse(
 
     watch = Watch(len(begun), lambda lost: margin(~lost) < wanted)
     fall = acceptance.fall(config)
-    outcome = simulate(creature, champion, begun, seconds, fall=fall, threads=threads, watch=watch)
+    outcome = simulate(creature, champion, begun, seconds, fall=fall, watch=watch)
     if watch.over:
         return margin(~watch.lost)
     succeeded = acceptance.succeeded(outcome, begun, config)
     reached = margin(np.where(np.arange(len(begun)) < count, succeeded, outcome.stayed_up))
     if reached < wanted:
         return reached
-    return min(reached, _worst(steering_criteria(creature, champion, config, draw, threads)))
+    return min(reached, _worst(steering_criteria(creature, champion, config, draw)))
 
 
 def _cautious(well: np.ndarray, caution: float) -> float:

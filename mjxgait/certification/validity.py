@@ -143,6 +143,16 @@ def read_stress(path: Path, champion: Champion) -> StressDocument | None:
     return cast(StressDocument, found)
 
 
+def stress_in_words(document: StressDocument) -> str:
+    """Return a sentence on whether the champion walks anywhere, and what it fails."""
+    if document["passed"]:
+        return "It walks anywhere."
+    if document["reservation"]:
+        return f"It is not known to walk anywhere: {document['reservation']}."
+    failed = [f"{t['name']} {t['share']:.0%}" for t in document["trials"] if not t["passed"]]
+    return f"It does not walk anywhere: {', '.join(failed)}."
+
+
 def _read(path: Path, schema: type, command: str) -> dict[str, Any] | None:
     """Read and check a document. command: `mjxgait` command that writes it."""
     if not path.exists():

@@ -270,7 +270,8 @@ def read_champion(path: Path, creature: Creature) -> Champion:
 def _champion(document: Mapping[str, Any], creature: Creature, path: Path) -> Champion:
     if document["schema"] != SCHEMA:
         raise UserError(
-            f"{path}: written with schema {document['schema']}, this version reads {SCHEMA}"
+            f"{path}: written with schema {document['schema']}, this version reads {SCHEMA}; "
+            "use the version that wrote it"
         )
     if document["creature_digest"] != creature.digest:
         raise UserError(

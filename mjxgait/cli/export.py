@@ -3,10 +3,10 @@
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
 
 import tyro
 
+from mjxgait.animation import Rate
 from mjxgait.cli.options import parsed
 
 
@@ -30,7 +30,7 @@ class ExportOptions:
     run: tyro.conf.Positional[Path]
     out: Path
     onto: Path | None = None
-    rate: Literal[24, 30, 60] = 30
+    rate: Rate = 30
     travelling: bool = False
 
 

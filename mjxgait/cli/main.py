@@ -1,4 +1,4 @@
-"""The command line: `mjxgait SUBCOMMAND`; `scripts/*.py` are thin wrappers around it."""
+"""The command line: `mjxgait SUBCOMMAND`."""
 
 import importlib
 import importlib.metadata

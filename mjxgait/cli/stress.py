@@ -1,7 +1,6 @@
 """`mjxgait stress`: stress tests of a walk."""
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -47,8 +46,7 @@ def stress_command(arguments: Sequence[str]) -> int:
     print("\n".join(found.rows()))
     picture = options.run / "stress"
     with disk_errors(options.run), figure((7.0, 3.6)) as drawing:
-        text = json.dumps(found.document(), indent=2) + "\n"
-        write_text(options.run / STRESS, text)
+        write_text(options.run / STRESS, found.to_json())
         draw_stress(drawing, found)
         files = save(drawing, picture, ("png",))
     print(f"{options.run / STRESS}, {files[0]}")

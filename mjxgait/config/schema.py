@@ -160,7 +160,8 @@ class ExaminationConfig:
         first is often the luckiest.
       tryout: starts on which all candidates run in evolution's physics before one is validated, the
         best first; 0 takes them by their fitness.
-      difference: in units of each gene's range, root mean square; what counts as different.
+      difference: in units of each gene's range (of programs and brains, of their raw values), root
+        mean square; what counts as different.
       level: what ends a run early: a walk that passes the certificate, or one that walks anywhere
         (docs/reference/certificate.md).
     """

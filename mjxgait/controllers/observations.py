@@ -111,7 +111,7 @@ def check_observations(reads: Collection[str], added: Collection[str] = ()) -> N
     known = [*SENSES, *added]
     for name in reads:
         if name not in known:
-            raise UserError(f'there is no sense "{name}"; {did_you_mean(name, known)}')
+            raise UserError(f'there is no observation "{name}"; {did_you_mean(name, known)}')
 
 
 def forward_way(creature: Body, sensed: Sensed) -> jax.Array:

@@ -71,12 +71,17 @@ def _check_known(name: str, names: list[str], key: str) -> None:
 def _check_names(names: list[str], partner: np.ndarray) -> None:
     """Refuse names that contradict the geometry."""
     for name, other in zip(names, (names[p] for p in partner), strict=True):
-        swapped = name.replace("left", "\0").replace("right", "left").replace("\0", "right")
+        swapped = other_side(name)
         if swapped != name and swapped in names and swapped != other:
             raise UserError(
                 f'joint "{name}" mirrors to "{other}" by its geometry but to "{swapped}" by its '
                 "name; settle it in [mirror] pairs"
             )
+
+
+def other_side(name: str) -> str:
+    """Return the name with left and right exchanged."""
+    return name.replace("left", "\0").replace("right", "left").replace("\0", "right")
 
 
 def stepping_of(

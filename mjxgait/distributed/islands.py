@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.champion import write_champion
 from mjxgait.config.evolution import IslandsConfig
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
@@ -27,7 +26,6 @@ from mjxgait.training.examination import Examined, Examiner, why_ended
 from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import (
-    CHAMPION,
     EXAMS,
     ISLANDS,
     METRICS,
@@ -38,7 +36,7 @@ from mjxgait.training.folder import (
     truncate_metrics,
 )
 from mjxgait.training.lock import locked_run
-from mjxgait.training.loop import conclude, interruptible, report
+from mjxgait.training.loop import conclude, interruptible, keep_best, report
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 
@@ -242,10 +240,7 @@ class _Islands:
     def _examine(self) -> None:
         """Write the best as champion; set `reason` if the run is over."""
         experiment, state = self.examiner.experiment, self.together()
-        if np.isfinite(state.fitness[0]):
-            with disk_errors(self.folder):
-                champion = experiment.champion(state, versions())
-                write_champion(champion, experiment.creature, self.folder / CHAMPION)
+        keep_best(self.folder, experiment, state)
         self.reason = stop_reason(state, self.config.evolution)
         if self.reason is None and (examined := self.examiner.early(state)):
             self.examined = examined

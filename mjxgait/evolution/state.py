@@ -76,7 +76,8 @@ class GenerationMetrics:
     """Metrics of a generation: scalars except best_terms [F] and best_outcome [O].
 
     best_terms, best_outcome: mean over the trials of the best individual. unique: different
-    genomes. spread: mean standard deviation of a gene. failures: number of the offspring's episodes
+    genomes. spread: standard deviation over the population, in the units of each array of the genome:
+    mean over an array's genes, then over the arrays. failures: number of the offspring's episodes
     that ended early. mothers: [P] places of the population, or of its mothers, in the generation
     before; None where that is not recorded. level: of the next generation's trials; None without a
     curriculum.

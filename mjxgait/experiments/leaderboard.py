@@ -114,7 +114,8 @@ def with_new(board: Path, entries: Iterable[Entry]) -> list[Entry]:
     for entry in entries:
         if entry in known:
             raise UserError(
-                f"{board}: has seed {entry.seed} of {' '.join(entry.group[:3])} already"
+                f"{board}: has seed {entry.seed} of {' '.join(entry.group[:3])} already; leave "
+                "this run out"
             )
         known.append(entry)
     return known

@@ -50,7 +50,7 @@ def read_seeds(zoo: Path) -> Seeds:
     """
     seeds = build(Seeds, read_toml(zoo / ZOO), str(zoo / ZOO))
     if not seeds.seeds:
-        raise UserError(f"{zoo / ZOO}: seeds: there is none")
+        raise UserError(f"{zoo / ZOO}: seeds: there is none; list the seed of each folder seedN")
     return seeds
 
 

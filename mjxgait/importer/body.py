@@ -182,14 +182,12 @@ class KinematicModel:
             moves[j] = np.cross(self.data.xaxis[j + 1], at - self.data.xanchor[j + 1])
         return moves
 
-    def mirror(
-        self, forward: np.ndarray, q: np.ndarray, slack: float = 1.0
-    ) -> tuple[np.ndarray, np.ndarray] | None:
+    def mirror(self, forward: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """Partner and sign [J] under reflection in the vertical plane along `forward` [3].
 
-        None for an unsymmetric body. slack: see `images`.
+        None for an unsymmetric body.
         """
-        partner, sign = self.images(forward, q, slack)
+        partner, sign = self.images(forward, q, slack=1.0)
         return None if (partner < 0).any() else (partner, sign)
 
     def images(

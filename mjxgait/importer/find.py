@@ -1,13 +1,12 @@
 """Anatomy of a compiled model; models that cannot be a creature are refused."""
 
-import fnmatch
 from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
 from mjxgait.creature.geometry import ancestors, posed, subtree
-from mjxgait.errors import UserError, listed, matching
+from mjxgait.errors import UserError, listed, matches, matching
 from mjxgait.importer.anatomy import (
     HINGE,
     SLIDE,
@@ -125,8 +124,7 @@ def _choose_joints(
     on_legs = {b for foot in anatomy.feet for b in ancestors(model, foot)}
     frozen = []
     for j in movable:
-        wanted = any(fnmatch.fnmatchcase(model.joint(j).name, pattern) for pattern in keep)
-        if model.jnt_bodyid[j] in on_legs or wanted:
+        if model.jnt_bodyid[j] in on_legs or matches(model.joint(j).name, keep):
             anatomy.active.append(j)
         else:
             frozen.append(model.joint(j).name or f"joint {j}")
@@ -160,11 +158,7 @@ def _freeze_least(
             return float(np.linalg.norm(np.cross(data.xaxis[joint], arms), axis=1).max())
 
         kept.update(sorted(leg, key=reach, reverse=True)[:ENOUGH])
-    kept.update(
-        j
-        for j in anatomy.active
-        if any(fnmatch.fnmatchcase(model.joint(j).name, pattern) for pattern in keep)
-    )
+    kept.update(j for j in anatomy.active if matches(model.joint(j).name, keep))
     frozen = [model.joint(j).name or f"joint {j}" for j in anatomy.active if j not in kept]
     notes.change(
         f"joints {listed(frozen)} frozen",

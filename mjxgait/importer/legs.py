@@ -1,6 +1,5 @@
 """Joints of a compiled model that could move, and limbs that are legs."""
 
-import fnmatch
 import re
 from collections.abc import Callable, Sequence
 
@@ -8,7 +7,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.geometry import ancestors, posed, subtree
-from mjxgait.errors import UserError, listed
+from mjxgait.errors import UserError, listed, matches
 from mjxgait.importer.anatomy import FREE, HINGE, SLIDE, Anatomy
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.shapes import Shape
@@ -45,7 +44,7 @@ def movable_joints(
             continue
         if kind == SLIDE:
             slides.append(name or f"joint {j}")
-        elif any(fnmatch.fnmatchcase(name, pattern) for pattern in freeze):
+        elif matches(name, freeze):
             frozen.append(name)
         elif name not in coupled and j not in followers and kind != FREE:
             joints.append(j)

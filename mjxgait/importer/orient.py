@@ -5,6 +5,7 @@ import re
 import numpy as np
 
 from mjxgait.creature.geometry import off_axis
+from mjxgait.creature.joints import other_side
 from mjxgait.errors import listed
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.notes import Confidence, Notes
@@ -275,7 +276,7 @@ def _nearly_mirrored(
     axes = kinematics.data.xaxis[1:]
     alone = []
     for j in lone:
-        other = _other_side(kinematics.names[j])
+        other = other_side(kinematics.names[j])
         partner[j] = k = kinematics.names.index(other) if other in kinematics.names else j
         if k == j:
             alone.append(kinematics.names[j])
@@ -314,11 +315,6 @@ def _mirrors(
 
 def _names_disagree(names: list[str], partner: np.ndarray) -> bool:
     return any(
-        _other_side(name) in names and _other_side(name) not in (name, names[partner[j]])
+        other_side(name) in names and other_side(name) not in (name, names[partner[j]])
         for j, name in enumerate(names)
     )
-
-
-def _other_side(name: str) -> str:
-    """Return the name with left and right exchanged."""
-    return name.replace("left", "\0").replace("right", "left").replace("\0", "right")

@@ -16,6 +16,7 @@ from mjxgait.certification import (
     outdated,
     read_certificate,
     read_stress,
+    stress_in_words,
     verdict_of,
 )
 from mjxgait.certification.describe import in_words
@@ -103,12 +104,7 @@ def _anywhere(snapshot: Snapshot) -> str:
     document = _stress(snapshot)
     if document is None:
         return ""
-    if document["passed"]:
-        return " It walks anywhere."
-    if document["reservation"]:
-        return f" It is not known to walk anywhere: {document['reservation']}."
-    short = [f"{t['name']} {t['share']:.0%}" for t in document["trials"] if not t["passed"]]
-    return f" It does not walk anywhere: {', '.join(short)}."
+    return f" {stress_in_words(document)}"
 
 
 class Summary(TypedDict):

@@ -59,6 +59,14 @@ def print_columns(title: str, rows: Mapping[str, Sequence[object]], console: Con
     console.print(table)
 
 
+def print_shared(found: Facts, console: Console) -> None:
+    """Print the number of genomes that are in both populations of a difference."""
+    if found["same_individuals"] is None:
+        console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
+    else:
+        console.print(f"\n{found['same_individuals']} genomes are in both populations.")
+
+
 def title(individual: Facts) -> str:
     """Return an individual's title."""
     return "champion" if individual["rank"] == 1 else f"individual {individual['rank']}"
@@ -117,10 +125,7 @@ class PlainView(GenomeView):
 
     @override
     def show_difference(self, found: Facts, console: Console) -> None:
-        if found["same_individuals"] is None:
-            console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
-        else:
-            console.print(f"\n{found['same_individuals']} genomes are in both populations.")
+        print_shared(found, console)
         _print_arrays("champion: from A to B", found["champion_moved"], console)
 
 

@@ -29,7 +29,7 @@ def _check_options(creature: Creature, config: Config) -> None:
     if config.examination.level != "walks" and task != "walk":
         raise UserError(
             f"examination.level = {config.examination.level}: it is for walks, and this task is "
-            f"{task}"
+            f"{task}; leave it out"
         )
     kind = known_task(task)
     if config.rollout.moves and kind and "follow" not in kind.tables:

@@ -121,9 +121,12 @@ def load(kind: str, text: str) -> str:
             "of your own"
         )
     path = Path(place)
-    cls = getattr(_module(path, kind), name, None)
+    module = _module(path, kind)
+    cls = getattr(module, name, None)
     if not inspect.isclass(cls):
-        raise UserError(f'{path}: has no class "{name}"')
+        classes = inspect.getmembers(module, inspect.isclass)
+        own = [known for known, one in classes if one.__module__ == module.__name__]
+        raise UserError(f'{path}: has no class "{name}"; {did_you_mean(name, own)}')
     base = _base(kind)
     if not issubclass(cls, base):
         raise UserError(f"{path}: {name} must inherit from {base.__module__}.{base.__name__}")

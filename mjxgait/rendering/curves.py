@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from mjxgait.certification.stress import Stress
 from mjxgait.files import replaced
-from mjxgait.training.folder import Line
+from mjxgait.training.folder import Line, columns
 
 matplotlib.use("Agg")
 
@@ -168,7 +168,7 @@ def draw_diversity(axes: Axes, lines: Lines) -> None:
         linewidth=1.6,
         label="spread of a gene (right)",
     )
-    spread.set(ylabel="mean standard deviation (rad)")
+    spread.set(ylabel="mean standard deviation")
     spread.set_ylim(bottom=0)
     spread.grid(False)
     spread.spines["right"].set_visible(True)
@@ -198,16 +198,6 @@ def progress_figures(lines: Lines, weights: Mapping[str, np.ndarray]) -> Figures
         "terms": ((9.5, 4.5), lambda drawing: draw_terms(drawing.subplots(), lines, weights)),
         "diversity": ((8, 3.5), lambda drawing: draw_diversity(drawing.subplots(), lines)),
         **(size if "nodes_mean" in lines[0] else {}),
-    }
-
-
-def columns(lines: Lines) -> dict[str, np.ndarray]:
-    """Return each metric over the generations; missing values are NaN."""
-    return {
-        key: np.array(
-            [np.nan if (value := line.get(key)) is None else value for line in lines], float
-        )
-        for key in lines[0]
     }
 
 
@@ -244,4 +234,4 @@ def draw_stress(drawing: Figure, found: Stress) -> None:
     axes.axvline(found.config.share, color=DARK, linestyle=":")
     axes.set(xlim=(0, 1.12), xlabel=f"share of {found.config.starts} starts")
     axes.invert_yaxis()
-    axes.set_title("It walks anywhere" if found.passed else "It does not walk anywhere yet")
+    axes.set_title(found.verdict.removesuffix("."))

@@ -1,4 +1,4 @@
-"""Videos of one champion, or several walks as a race, as WebP, GIF, MP4 or PNG."""
+"""Videos of one champion, or several walks as a race, as WebP, GIF or MP4."""
 
 import dataclasses
 import itertools
@@ -18,7 +18,8 @@ from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.walk import Walk, record_walk
 from mjxgait.training.folder import open_champion, require_output
 
-FORMATS = (".webp", ".gif", ".mp4", ".png")
+VIDEOS = (".webp", ".gif", ".mp4")
+STILL = ".png"
 PAPER = (255, 255, 255, 200)
 LABEL_GAP = 8
 """Pixels between a creature and its label."""
@@ -101,28 +102,31 @@ def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
     Raises:
       UserError: another format, MP4 without the extra, or a file that cannot be written.
     """
+    _require_format(path, VIDEOS)
     writers = {".mp4": _write_mp4, ".webp": _write_webp, ".gif": _write_gif}
-    if (write := writers.get(path.suffix.lower())) is None:
-        raise UserError(
-            f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}'
-        )
+    write = writers[path.suffix.lower()]
     with writing(path), replaced(path) as beside:
         write(pictures, beside, fps)
 
 
-def require_writer(path: Path) -> None:
+def require_writer(path: Path, stills: bool = False) -> None:
     """Check before the long work that the file can be written.
+
+    stills: whether a picture will do as well as a video.
 
     Raises:
       UserError: see `write_video`.
     """
-    if path.suffix.lower() not in FORMATS:
-        raise UserError(
-            f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}'
-        )
+    _require_format(path, (*VIDEOS, STILL) if stills else VIDEOS)
     if path.suffix.lower() == ".mp4":
         _import_av(path)
     require_output(path)
+
+
+def _require_format(path: Path, formats: Sequence[str]) -> None:
+    if path.suffix.lower() not in formats:
+        endings = ", ".join(formats)
+        raise UserError(f'{path}: cannot write "{path.suffix}"; end the name with {endings}')
 
 
 def _write_webp(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:

@@ -236,13 +236,9 @@ class Walk:
         chosen = int(np.argmin(np.abs(lengths - np.median(lengths))))
         return int(starts[chosen]), int(starts[chosen + count])
 
-    def body_poses(self, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def body_poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return world positions [T, nbody, 3] m and rotations [T, nbody, 3, 3] of the bodies."""
-        return poses_of(
-            self.creature.model,
-            self.qpos if frames is None else self.qpos[frames],
-            ("xpos", "xmat"),
-        )
+        return poses_of(self.creature.model, self.qpos, ("xpos", "xmat"))
 
     def geom_poses(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return world positions [T, G, 3] m and rotations [T, G, 3, 3] of all geoms in `shown`."""

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import pydantic
 import tomli_w
 
@@ -322,6 +323,15 @@ def read_metrics(path: Path) -> list[Line]:
             if not isinstance(value, int | float | None) and name not in (MOTHERS, "variant"):
                 raise DamagedFile(f"{path}, line {number}: {name} is not a number; {TAKE_OUT}")
     return lines
+
+
+def columns(lines: Sequence[Line]) -> dict[str, np.ndarray]:
+    """Return each metric but `mothers` over the generations [G], NaN where it is missing."""
+    names = dict.fromkeys(name for line in lines for name in line if name != MOTHERS)
+    return {
+        name: np.array([np.nan if line.get(name) is None else line[name] for line in lines])
+        for name in names
+    }
 
 
 def read_records(path: Path, schema: type) -> list[Line]:

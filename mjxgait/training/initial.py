@@ -63,7 +63,10 @@ def initial_of(source: Path) -> Initial:
     arrays = read_stored(source, creature.digest).arrays
     alive = np.isfinite(arrays["fitness"])
     if not alive.any():
-        raise UserError(f"{source}: no individual of its last checkpoint has a fitness")
+        raise UserError(
+            f"{source}: no individual of its last checkpoint has a fitness; take a run with more "
+            "generations"
+        )
     found = {k.removeprefix(GENOMES): v[alive] for k, v in arrays.items() if k.startswith(GENOMES)}
     controller = build_experiment(creature, config).simulator.controller
     for observation, names in _genes_of(controller).items():
@@ -109,11 +112,14 @@ def check_initial(initial: Initial, experiment: Experiment) -> None:
             f"{use.controller}; give the new run --use.controller {initial.controller}"
         )
     if initial.joints != _joints(experiment.creature):
-        raise UserError(f"{initial.source}: its body has other joints than the new run's")
+        raise UserError(
+            f"{initial.source}: its body has other joints than the new run's; take a run of the "
+            "same body"
+        )
     if initial.joints and set(initial.reads) != set(controller.reads):
         raise UserError(
             f"{initial.source}: its controller observes {', '.join(initial.reads)}, that of the "
-            f"new run {', '.join(controller.reads)}"
+            f"new run {', '.join(controller.reads)}; take a run with the same observations"
         )
     wanted, found = _shapes(by_name(experiment.abstract().genomes)), _shapes(initial.genomes)
     wanted = _without_idle(wanted, found, controller)

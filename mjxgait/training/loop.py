@@ -1,6 +1,5 @@
 """Host loop around the jitted generation: it counts, logs, checkpoints and stops."""
 
-import json
 import signal
 import threading
 import time
@@ -149,10 +148,15 @@ def mend_champion(folder: Path, experiment: Experiment, state: EvolutionState) -
     try:
         kept_champion(folder, experiment.creature)
     except UserError:
-        if np.isfinite(state.fitness[0]):
-            with disk_errors(folder):
-                champion = experiment.champion(state, versions())
-                write_champion(champion, experiment.creature, folder / CHAMPION)
+        keep_best(folder, experiment, state)
+
+
+def keep_best(folder: Path, experiment: Experiment, state: EvolutionState) -> None:
+    """Write the best of a state as the run's champion if its fitness is finite."""
+    if np.isfinite(state.fitness[0]):
+        with disk_errors(folder):
+            champion = experiment.champion(state, versions())
+            write_champion(champion, experiment.creature, folder / CHAMPION)
 
 
 def _compiled(
@@ -200,8 +204,7 @@ def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examine
             write_creature(folder / BODY, body.files)
         write_text(folder / CERTIFICATE, examined.certificate.to_json())
         if examined.beyond:
-            text = json.dumps(examined.beyond.document(), indent=2) + "\n"
-            write_text(folder / STRESS, text)
+            write_text(folder / STRESS, examined.beyond.to_json())
     screen.certificate(examined.certificate)
 
 
@@ -265,10 +268,7 @@ def _generation(
     lines, state = generations.advance(), generations.row()
     for line in lines:
         append_lines(folder / METRICS, [line])
-        if line["best"] is not None:
-            champion = experiment.champion(state, versions())
-            with disk_errors(folder):
-                write_champion(champion, experiment.creature, folder / CHAMPION)
+        keep_best(folder, experiment, state)
         screen.generation(line, experiment.config)
     if lines and not state.seeded:
         screen.say(

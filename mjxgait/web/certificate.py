@@ -11,6 +11,7 @@ from mjxgait.certification import (
     outdated,
     read_certificate,
     read_stress,
+    stress_in_words,
     verdict_of,
 )
 from mjxgait.certification.advice import ADVICE
@@ -89,9 +90,7 @@ def _anywhere(run: Path, champion: Champion) -> str:
     document = read_stress(run / STRESS, champion)
     if document is None:
         return ""
-    verdict = "It walks anywhere." if document["passed"] else "It does not walk anywhere."
-    if document["reservation"]:
-        verdict = f"It is not known to walk anywhere: {html.escape(document['reservation'])}."
+    verdict = html.escape(stress_in_words(document))
     rows = [
         [t["name"], f"{t['share']:.0%}", "pass" if t["passed"] else "fails"]
         for t in document["trials"]

@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+from typing import get_args
 
 import mujoco
 import numpy as np
@@ -10,7 +11,8 @@ import pygltflib as gltf
 import pytest
 from rendering.made_up import treading
 
-from mjxgait.animation.export import RATES, build_glb, walk_loop
+from mjxgait.animation import Rate
+from mjxgait.animation.export import build_glb, walk_loop
 from mjxgait.animation.export.skeleton import gltf_axes, resting
 from mjxgait.animation.export.surface import ALONG, geom_surface
 from mjxgait.cli import main
@@ -151,7 +153,7 @@ def test_in_place_stays_at_the_origin_and_travelling_leads_forward(stool):
     np.testing.assert_allclose(last[:3, 3], [0, 0, loop.advance], atol=1e-5)
 
 
-@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("rate", get_args(Rate))
 def test_frames_follow_the_rate_and_the_duration_is_kept(stool, rate):
     loop = walk_loop(record_walk(stool, treading(stool, period=0.53), 6.0), rate)
     document = gltf.GLTF2.load_from_bytes(build_glb(loop))

@@ -85,11 +85,21 @@ def test_nine_of_ten_starts_must_succeed():
     trials = (Trial("plain", 1.0, True), Trial("bumps", 0.875, False))
     found = Stress("abc", trials, StressConfig())
     assert not found.passed
+    assert found.verdict == "It does not walk anywhere yet."
     assert json.loads(json.dumps(found.document()))["trials"][1]["share"] == 0.875
     with figure((5, 3)) as drawing:
         draw_stress(drawing, found)
         labels = [text.get_text() for text in drawing.axes[0].texts]
     assert labels == ["100%", "88%"]
+
+
+def test_only_the_shipped_settings_say_that_it_walks_anywhere():
+    usual, few = (
+        Stress("abc", (Trial("plain", 1.0, True),), config)
+        for config in (StressConfig(), StressConfig(starts=1))
+    )
+    assert usual.verdict == "It walks anywhere."
+    assert "by other settings" in few.verdict
 
 
 def test_only_walks_have_stress_tests(tiny, trotter):

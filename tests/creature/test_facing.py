@@ -103,8 +103,7 @@ def test_facing_aside_keeps_the_turning_of_the_hips(rich: Creature, way: str):
 @pytest.mark.parametrize("way", ["back", "left", "right"])
 def test_first_steps_another_way_may_be_bad(rich: Creature, way: str):
     usual, turned = (
-        resolve_config(c.settings.train, c.name).fitness.leniency
-        for c in (rich, facing(rich, way))
+        resolve_config(c.settings.train, c.name).fitness.leniency for c in (rich, facing(rich, way))
     )
     assert (usual, turned) == (0.0, 1.0)
 

@@ -193,7 +193,7 @@ def test_actions_span_each_joints_range(environment: Environment):
 def test_a_body_that_grows_and_an_unknown_name_are_one_sentence(stool: Creature):
     with pytest.raises(UserError, match="blocks: its body grows from each genome"):
         mjxgait.environment("blocks")
-    with pytest.raises(UserError, match='no sense "joint_poss"; did you mean "joint_pos"'):
+    with pytest.raises(UserError, match='no observation "joint_poss"; did you mean "joint_pos"'):
         mjxgait.environment(stool, observe=["joint_poss"])
     with pytest.raises(UserError, match="only bodies that grow swim"):
         mjxgait.environment(stool, "swim")

@@ -198,7 +198,7 @@ def test_the_dashboard_of_a_run_gets_the_same_code(folder: Path, trained, monkey
         ("--task my.py", "give FILE.py:CLASS"),
         ("--task", "name one of hop"),
         ("--use.controller my.py:Other", "name it with --controller FILE.py:CLASS"),
-        ("--controller wild.py:Wild", 'there is no sense "jont_pos"'),
+        ("--controller wild.py:Wild", 'there is no observation "jont_pos"'),
     ],
 )
 def test_a_mistake_is_one_sentence(folder: Path, arguments, words, capfd, monkeypatch):

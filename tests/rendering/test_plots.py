@@ -9,12 +9,12 @@ from PIL import Image
 from rendering.made_up import falling, metrics_line, treading, write_run
 
 from mjxgait.errors import UserError
-from mjxgait.rendering.curves import columns, draw_fitness, figure, plot_fitness
+from mjxgait.rendering.curves import draw_fitness, figure, plot_fitness
 from mjxgait.rendering.filmstrip import filmstrip
 from mjxgait.rendering.gaitplots import gait_window
 from mjxgait.rendering.plots import plot_run
 from mjxgait.rendering.walk import record_walk
-from mjxgait.training.folder import METRICS
+from mjxgait.training.folder import METRICS, columns
 
 PROGRESS = {"fitness", "terms", "diversity"}
 GAIT = {"footfalls", "joints", "trunk", "filmstrip"}
@@ -94,6 +94,7 @@ def test_nothing_to_plot_is_reported(stool, tmp_path):
 
 def test_missing_numbers_are_gaps():
     assert np.isnan(columns([metrics_line(0) | {"best": None}, metrics_line(1)])["best"][0])
+    assert np.isnan(columns([metrics_line(0), metrics_line(1) | {"later": 1.0}])["later"][0])
 
 
 def test_every_run_gets_a_fitness_curve(tmp_path):

@@ -24,7 +24,6 @@ from mjxgait.config.tables import added_in
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.inspect.sections import island_facts
-from mjxgait.rendering.curves import columns
 from mjxgait.rendering.walk import record_walk
 from mjxgait.training.exams import Exams
 from mjxgait.training.folder import (
@@ -32,6 +31,7 @@ from mjxgait.training.folder import (
     CHAMPION,
     CONFIG,
     METRICS,
+    columns,
     open_run,
     read_metrics,
 )

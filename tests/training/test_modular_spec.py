@@ -41,7 +41,7 @@ def test_a_brain_reads_only_available_observations():
     register(dataclasses.replace(controller_kind("brain"), name="smelling", controller=Smelling))
     assert simulator("brain").controller.reads == ("joint_pos", "contact")
     assert simulator("brain", "follow").controller.reads == ("joint_pos", "contact", "light")
-    with pytest.raises(UserError, match='there is no sense "contcat"'):
+    with pytest.raises(UserError, match='there is no observation "contcat"'):
         simulator("smelling")
 
 

@@ -134,6 +134,10 @@ REFUSED = {
         ["RUNS", "--out", "all.html", "--poster", "all.svg"],
         "end the name with .webp, .png, .jpg",
     ),
+    "a still as a video": (
+        ["RUNS", "--out", "all.html", "--video", "all.png"],
+        "end the name with .webp, .gif, .mp4",
+    ),
     "no task": (["RUNS", "--out", "all.html", "--seed", "3"], "--seed: evolves runs"),
     "runs and a task": (["RUNS", "--task", "swim"], "not both"),
     "no folder of runs": ([".", "--out", "all.html"], "neither a run folder nor"),

@@ -246,7 +246,7 @@ def test_stress_results_are_shown_beside_the_certificate(stool, tmp_path):
     found = Stress(champion.fingerprint, trials, StressConfig())
     (run / STRESS).write_text(json.dumps(found.document()))
     table = certificate_table(run, stool, champion)
-    assert "It does not walk anywhere." in table
+    assert "It does not walk anywhere: friction 0.4 25%." in table
     assert re.search(r"friction 0.4.*25%.*fails", table)
     (run / STRESS).write_text("{}")
     with pytest.raises(UserError, match="mjxgait stress"):

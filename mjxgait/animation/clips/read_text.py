@@ -33,13 +33,14 @@ def read_csv(path: Path) -> AngleTrack:
     Raises:
       UserError: names the line that cannot be read.
     """
-    lines = [row for row in csv.reader(read_text(path).splitlines()) if row]
-    names = [name.strip() for name in lines[0]] if lines else []
+    reader = csv.reader(read_text(path).splitlines())
+    lines = [(reader.line_num, row) for row in reader if row]
+    names = [name.strip() for name in lines[0][1]] if lines else []
     if "time" not in names:
         raise UserError(f'{path}: its first line must name the columns, one of them "time"')
     check_size(path, len(names), len(lines) - 1)
     rows = []
-    for number, row in enumerate(lines[1:], 2):
+    for number, row in lines[1:]:
         try:
             rows.append([float(value) for value in row])
         except ValueError:

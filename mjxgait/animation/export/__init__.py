@@ -10,7 +10,6 @@ from mjxgait.animation.export.glb import (
     export_glb,
 )
 from mjxgait.animation.export.loop import (
-    RATES,
     WalkLoop,
     falls_of_first_foot,
     resampled,
@@ -25,7 +24,6 @@ from mjxgait.animation.export.viewpoint import viewpoint
 
 __all__ = [
     "LOOP",
-    "RATES",
     "Character",
     "WalkLoop",
     "bones_of",

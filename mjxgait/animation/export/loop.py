@@ -14,7 +14,6 @@ from mjxgait.errors import UserError
 from mjxgait.reference.measure import falls_of_feet
 from mjxgait.rendering.walk import Walk
 
-RATES = (24, 30, 60)
 MOST_STRIDES = 4
 TOLERANCE = 0.01
 """Relative change of speed, from the fit to whole frames, above which another stride is added."""

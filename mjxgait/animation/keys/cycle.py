@@ -70,7 +70,10 @@ def find_cycle(
     if last - first < SHORTEST:
         raise UserError(f"a cycle of {last - first:.3g} s: at least {SHORTEST} s are needed")
     if np.ptp(angles[(times >= first) & (times <= last)], axis=0).max(initial=0) < STILL:
-        raise UserError("nothing moves: no joint turns by a degree")
+        raise UserError(
+            "nothing moves: no joint turns by a degree; name the moving seconds with --from and "
+            "--to, or the joints with --names"
+        )
     period = last - first if end is not None else _period(times, angles, first, last)
     samples = _sampled(times, angles, first, period, SAMPLES + 1)
     gap = float(np.sqrt(np.mean((samples[-1] - samples[0]) ** 2)))

@@ -144,7 +144,10 @@ def read_original(folder: Path, creature: Creature) -> Original:
     """
     path = folder / KEYS
     if not path.exists():
-        raise UserError(f"{folder}: was not made by `mjxgait refine` (it has no {KEYS})")
+        raise UserError(
+            f"{folder}: was not made by `mjxgait refine` (it has no {KEYS}); name a run that this "
+            "command made, or begin one with it"
+        )
     try:
         document = read_json(path)
         angles = np.array([document["joints"][name] for name in creature.joints.names], float).T
@@ -166,14 +169,12 @@ class Departure:
 
     poses: deg, root mean square difference of the key poses from the original ones. moved: the
     same for the joints as they moved against the drawn cycle, without their delay; period: share of
-    the drawn one; both None where there is no steady stride. by_joint: deg, of the key poses.
-    words: one sentence for each change.
+    the drawn one; both None where there is no steady stride. words: one sentence for each change.
     """
 
     poses: float
     moved: float | None
     period: float | None
-    by_joint: dict[str, float]
     words: list[str]
 
 
@@ -192,7 +193,6 @@ def departure(original: Original, walk: Walk) -> Departure:
     creature, champion, count = walk.creature, walk.champion, len(original.angles)
     poses = np.asarray(champion.genome["key_poses"], float)
     apart = np.degrees(poses - np.reshape(champion.settings.around, poses.shape))
-    by_joint = np.sqrt(np.mean(apart**2, axis=0))
     moved, period, words = None, None, []
     if (found := walk.steady_strides(1)) is not None:
         drawn = np.roll(original.angles, -round(original.starts * count), axis=0)
@@ -203,8 +203,7 @@ def departure(original: Original, walk: Walk) -> Departure:
         period = (found[1] - found[0]) * walk.time_step / original.period
         pitch = float(np.mean(walk.recording.pitch[slice(*found)]))
         words = _feet_in_words(creature, drawn, nearest) + _in_words(pitch, period)
-    named = {n: float(a) for n, a in zip(creature.joints.names, by_joint, strict=True)}
-    return Departure(float(np.sqrt(np.mean(apart**2))), moved, period, named, words)
+    return Departure(float(np.sqrt(np.mean(apart**2))), moved, period, words)
 
 
 def _in_words(pitch: float, period: float) -> list[str]:
@@ -291,7 +290,7 @@ def check_front(out: Path, keeps: Sequence[float]) -> None:
     """
     check_free(out, "mjxgait refine --resume")
     if len(set(keeps)) < len(keeps):
-        raise UserError("--keep: a share is there twice")
+        raise UserError("--keep: name each share once")
 
 
 def finished(run: Path) -> bool:

@@ -223,7 +223,7 @@ class Programs:
         return program_variation(self.words, len(self.creature.joints.names), settings, first)
 
     def genes(self, genomes: Trees, settings: ProgramConfig) -> np.ndarray:
-        """Nodes either match or differ."""
+        """Codes and constants as they are, in no common unit."""
         code, value = (np.asarray(leaf) for leaf in (genomes.code, genomes.value))
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in (code, value)], axis=1)
 

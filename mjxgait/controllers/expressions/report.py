@@ -13,7 +13,7 @@ from mjxgait.controllers.expressions.text import (
     every_terminal,
     to_text,
 )
-from mjxgait.inspect.sections import GenomeView, title, titled_table
+from mjxgait.inspect.sections import GenomeView, print_shared, title, titled_table
 from mjxgait.inspect.snapshot import Snapshot, shared
 
 
@@ -66,10 +66,7 @@ class ProgramView(GenomeView):
 
     @override
     def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
-        if found["same_individuals"] is None:
-            console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
-        else:
-            console.print(f"\n{found['same_individuals']} genomes are in both populations.")
+        print_shared(found, console)
         for joint, (mine, other) in found["champion_expressions"].items():
             console.print(f"{joint}:\n  A {mine}\n  B {other}")
 

@@ -117,7 +117,10 @@ def chosen_terminals(known: Sequence[Terminal], patterns: Sequence[str]) -> tupl
             )
     found = tuple(t for t in known if any(fnmatch.fnmatchcase(t.name, p) for p in patterns))
     if not found:
-        raise UserError(f"controller.senses = {list(patterns)}: no sense has such a name")
+        raise UserError(
+            f"controller.senses = {list(patterns)}: no observation matches; name some of "
+            f"{', '.join(names)}"
+        )
     return found
 
 

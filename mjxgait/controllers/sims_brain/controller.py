@@ -90,7 +90,7 @@ class Brains:
         return Variation(create, cross, mutate)
 
     def genes(self, genomes: Genotype, settings: BrainConfig) -> np.ndarray:
-        """Kinds and flags either match or differ."""
+        """Kinds, flags and numbers as they are, in no common unit."""
         leaves = [np.asarray(leaf, float) for leaf in jax.tree.leaves(genomes)]
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 

@@ -8,7 +8,7 @@ from rich.console import Console
 from typing_extensions import override
 
 from mjxgait.controllers.sims_brain.reference_body import Part, grow
-from mjxgait.inspect.sections import GenomeView, title, titled_table
+from mjxgait.inspect.sections import GenomeView, print_shared, title, titled_table
 from mjxgait.inspect.snapshot import Snapshot, shared
 
 COLUMNS = ("part", "node", "on part", "joint", "size (cm)", "swing (deg)", "strength (N·m)")
@@ -51,10 +51,7 @@ class GraphView(GenomeView):
 
     @override
     def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
-        if found["same_individuals"] is None:
-            console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
-        else:
-            console.print(f"\n{found['same_individuals']} genomes are in both populations.")
+        print_shared(found, console)
         for name, parts in zip("AB", found["champion_parts"], strict=True):
             _print_parts(f"champion of {name}", parts, console)
 

@@ -6,18 +6,17 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from mjxgait.champion.serializers import Serializer
+from mjxgait.champion.serializers import PlainSerializer
 from mjxgait.config.tables import build
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.reference_body import FRICTION, GRAVITY, grow
 from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
-from mjxgait.errors import UserError
 from mjxgait.kinds import in_water
 
 
-class GraphSerializer(Serializer[BrainConfig]):
+class GraphSerializer(PlainSerializer[BrainConfig]):
     """Implementation of `Serializer`: arrays as nested lists under their names."""
 
     def settled(
@@ -42,15 +41,6 @@ class GraphSerializer(Serializer[BrainConfig]):
     @override
     def settings(self, table: Mapping[str, object], where: str) -> BrainConfig:
         return build(BrainConfig, table, where)
-
-    @override
-    def check(self, genome: Mapping[str, np.ndarray], creature: Creature) -> None:
-        for name, array in genome.items():
-            if not np.isfinite(array).all():
-                raise UserError(
-                    f"the genome's {name} has numbers that are not finite: nothing grows from it; "
-                    "take a champion of another generation"
-                )
 
     @override
     def shapes(self, settings: BrainConfig, creature: Creature) -> dict[str, tuple[int, ...]]:

@@ -308,8 +308,8 @@ def _entry(name: str, loop: WalkLoop, one: Found | None) -> dict[str, object]:
 RATE = 60
 
 
-def write_driven(folder: Path, out: Path) -> str:
-    """Write the page of a repertoire's certified walks; return an empty note.
+def write_driven(folder: Path, out: Path) -> None:
+    """Write the page of a repertoire's certified walks.
 
     Raises:
       UserError: no repertoire, none of its walks is certified, or the file cannot be written.
@@ -323,7 +323,6 @@ def write_driven(folder: Path, out: Path) -> str:
         )
     clips = table_of("", loops, found, travelling=False)["clips"]
     save_page(out, driven_page(loops, clips, len(found), _blends(folder)))
-    return ""
 
 
 def _blends(folder: Path) -> str:

@@ -49,7 +49,7 @@ def found_in(folder: Path, grid: Grid) -> list[Found]:
 def table(found: list[Found]) -> Table:
     """Return the table for the screen, a row per cell."""
     shown = Table(box=None, pad_edge=False)
-    for heading in ("clip", "m/s", "asked", "deg/s", "duty", "gait", "margin", "off deg", ""):
+    for heading in ("clip", "m/s", "target", "deg/s", "duty", "gait", "margin", "off deg", ""):
         shown.add_column(heading, justify="left" if heading in ("clip", "gait", "") else "right")
     for one in found:
         shown.add_row(

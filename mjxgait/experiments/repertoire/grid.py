@@ -87,7 +87,10 @@ class Grid:
           UserError: the folder holds none.
         """
         if not (folder / GRID).is_file():
-            raise UserError(f"{folder}: not the folder of a repertoire (it has no {GRID})")
+            raise UserError(
+                f"{folder}: not the folder of a repertoire (it has no {GRID}); name the folder "
+                "that `mjxgait repertoire` made"
+            )
         return build(cls, read_toml(folder / GRID), str(folder / GRID))
 
     @property
@@ -129,7 +132,8 @@ def check(config: Config) -> None:
     if (config.use.task, config.use.controller) != ("walk", "poses"):
         raise UserError(
             f"a repertoire is of walks by key poses, and this is to {config.use.task} by "
-            f"{config.use.controller}"
+            f"{config.use.controller}; name a creature that walks, or leave use.task and "
+            "use.controller out"
         )
     if config.evolution.body != 1:
         raise UserError("evolution.body: the clips of a repertoire are of one body; leave it at 1")

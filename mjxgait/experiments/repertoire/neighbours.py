@@ -18,9 +18,10 @@ from mjxgait.certification import CertificateConfig, nominal_check
 from mjxgait.certification.acceptance import Wish
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
+from mjxgait.controllers.key_poses.reference import pose_cycle
 from mjxgait.creature import Creature
 from mjxgait.experiments.repertoire.found import Found
-from mjxgait.experiments.repertoire.grid import Cell, Grid, has_mirror, mirrored
+from mjxgait.experiments.repertoire.grid import Cell, Grid, has_mirror
 from mjxgait.processes import one_per_core
 from mjxgait.reference.changing import ChangingReference
 from mjxgait.reference.outcome import Outcome
@@ -124,9 +125,7 @@ def half_way(one: Champion, other: Champion, creature: Creature) -> Champion:
 def _cycle(champion: Champion, creature: Creature) -> np.ndarray:
     """Return all poses [C, J] of a champion's cycle."""
     poses = champion.genome["key_poses"]
-    if not (champion.settings.mirror and creature.mirror.symmetric):
-        return poses
-    return np.concatenate([poses, mirrored(poses, creature)])
+    return pose_cycle(poses, creature) if champion.settings.mirror else poses
 
 
 def _between(one: Wish, other: Wish) -> dict[str, object]:

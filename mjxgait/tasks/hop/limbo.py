@@ -111,7 +111,10 @@ class Limbo(Hop):
           UserError: the ground is not flat, so a bar has no single height.
         """
         if not parse_ground(settings.ground).flat:
-            raise UserError(f"rollout.ground = {settings.ground}: task limbo needs flat ground")
+            raise UserError(
+                f"rollout.ground = {settings.ground}: task limbo needs flat ground; leave "
+                "rollout.ground out"
+            )
         starts = super().trials(key, creature, settings)
         return dataclasses.replace(starts, goal=LimboGoal(starts.goal, jnp.zeros(settings.starts)))
 

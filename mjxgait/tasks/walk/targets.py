@@ -37,8 +37,8 @@ class WalkTargets:
 
     Attributes:
       speed: such as 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
-      gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, waddle, natural (an
-        animal's at this speed, with its strides), or auto.
+      gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, waddle, alternating,
+        natural (an animal's at this speed, with its strides), or auto.
       turn: deg/s, to the left.
       steer: deg/s; the walk must obey turns to either side up to this rate.
       style: calm, sneaky, heavy, proud, tired, hurried, or a TOML file of settings.
@@ -112,7 +112,8 @@ def with_targets(config: Config, creature: Creature, targets: WalkTargets) -> Co
         return config
     if config.use.task != "walk":
         raise UserError(
-            f"--{', --'.join(TARGETS)} are for walking, and this is to {config.use.task}"
+            f"--{', --'.join(TARGETS)} are for walking, and this is to {config.use.task}; "
+            "leave them out"
         )
     if targets.style is not None:
         config = _styled(creature, config, targets.style)
@@ -127,7 +128,7 @@ def with_targets(config: Config, creature: Creature, targets: WalkTargets) -> Co
         table = merge(table, layer)
     if config.use.controller != "poses":
         table = {"fitness": table.get("fitness", {})}
-    return build(type(config), merge(dataclasses.asdict(config), table), "the wishes")
+    return build(type(config), merge(dataclasses.asdict(config), table), "the walk targets")
 
 
 def hint(config: Config) -> str | None:

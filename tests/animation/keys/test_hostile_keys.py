@@ -124,6 +124,11 @@ TEXT = {
     "strange channel": ("bvh", lambda t: t.replace("Zrotation", "Zscale"), "channels that BVH"),
     "columns without time": ("csv", lambda t: t.replace("time", "when"), 'one of them "time"'),
     "words": ("csv", lambda t: t + "\na,b", "has something that is no number"),
+    "words after empty lines": (
+        "csv",
+        lambda t: "\n\n".join([*t.splitlines()[:2], "a,b"]),
+        "line 5 has something",
+    ),
     "short row": ("csv", lambda t: t + "\n99", "has 1 values"),
     "time stands": ("csv", lambda t: t + "\n" + t.splitlines()[-1], "is not after the one before"),
     "nan in a column": ("csv", lambda t: t.replace(t.split(",")[-1], "nan"), "not a finite number"),
