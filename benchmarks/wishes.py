@@ -6,7 +6,8 @@
 
 For each creature every speed, every gait for its number of feet, every style; one row each, with
 the speed in C MuJoCo, the gait's name there, stride and duty factor over an animal's, whether the
-champion is certified, and the wall time. Options after `--` go to `train`, such as `-- --cluster HOST:PORT`.
+champion is certified, and the wall time. Options after `--` go to `train`, such as
+`-- --cluster HOST:PORT`.
 """
 
 import argparse

@@ -6,7 +6,7 @@ import json
 import os
 import re
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +61,17 @@ def read_text(path: Path, most: int = MOST_TEXT) -> str:
         return read_bytes(path, most).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise DamagedFile(f"{path}: not a text file in UTF-8") from None
+
+
+def require_ending(path: Path, endings: Sequence[str]) -> None:
+    """Check that a file to be written has one of these endings.
+
+    Raises:
+      UserError: names the endings.
+    """
+    if path.suffix.lower() not in endings:
+        known = ", ".join(endings)
+        raise UserError(f'{path}: cannot write "{path.suffix}"; end the name with {known}')
 
 
 def read_json(path: Path) -> Any:

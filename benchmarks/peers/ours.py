@@ -122,7 +122,7 @@ def as_workload(folder: Path, experiment: Experiment, state: EvolutionState) -> 
 
 REPEATS = 30
 GENERATIONS = 8
-"""Length of the run whose own loop is timed."""
+"""Generations of the run that times the loop on the host."""
 
 
 def overhead(ours: Ours) -> dict[str, float]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from mjxgait.animation import Rate
 from mjxgait.api.run import Place, Run
 from mjxgait.errors import UserError
-from mjxgait.files import path_of
+from mjxgait.files import path_of, require_ending
 from mjxgait.training.folder import require_output
 
 if TYPE_CHECKING:
@@ -87,8 +87,7 @@ def share(
       UserError: no champion, a wrong ending, no WebAssembly build, or the file cannot be written.
     """
     folder, file = folder_of(run), path_of(out)
-    if file.suffix.lower() not in PAGES:
-        raise UserError(f'{file}: cannot write "{file.suffix}"; end the name with .html')
+    require_ending(file, PAGES)
     if wasm and not physics:
         raise UserError(
             "--wasm names what --physics puts into the page; add --physics, or leave it out"
@@ -164,8 +163,8 @@ def _animation(loop: "WalkLoop", character: "Character | None", out: Path, trave
 
 def _check_names(out: Path, onto: Path | None) -> None:
     """Refuse a kind of file that is not written, and to write over the character."""
-    if (kind := out.suffix.lower()) not in KINDS:
-        raise UserError(f'{out}: cannot write "{out.suffix}"; end the name with {", ".join(KINDS)}')
+    require_ending(out, KINDS)
+    kind = out.suffix.lower()
     if onto is None:
         return
     if kind != ".glb":

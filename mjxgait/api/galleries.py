@@ -8,7 +8,7 @@ from mjxgait.api.exports import PAGES, Tell, folder_of, sized
 from mjxgait.api.run import Place, Run
 from mjxgait.api.studies import STUDY, champions_of_study
 from mjxgait.errors import UserError
-from mjxgait.files import path_of
+from mjxgait.files import path_of, require_ending
 from mjxgait.training.folder import CHAMPION, CONFIG, require_output
 
 if TYPE_CHECKING:
@@ -74,15 +74,10 @@ def check_files(page: Path | None, poster: Path | None, video: Path | None) -> N
       UserError: names the file.
     """
     if page is not None:
-        if page.suffix.lower() not in PAGES:
-            raise UserError(f'{page}: cannot write "{page.suffix}"; end the name with .html')
+        require_ending(page, PAGES)
         require_output(page)
     if poster is not None:
-        if poster.suffix.lower() not in STILLS:
-            endings = ", ".join(STILLS)
-            raise UserError(
-                f'{poster}: cannot write "{poster.suffix}"; end the name with {endings}'
-            )
+        require_ending(poster, STILLS)
         require_output(poster)
     if video is not None:
         from mjxgait.rendering.video import require_writer

@@ -72,9 +72,13 @@ def shapes(model: mujoco.MjModel) -> list[int]:
     return [int(g) for g in np.flatnonzero(collides & (model.geom_bodyid != 0))]
 
 
-def lowest(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Height of the lowest point that may touch something; m."""
-    return min(-geom_reach(model, data, g, DOWN) for g in shapes(model))
+def lowest(model: mujoco.MjModel, data: mujoco.MjData, body: int | None = None) -> float:
+    """Height of the lowest point, of all bodies or one, that may touch something; m.
+
+    Infinite for a body without such a point.
+    """
+    own = [g for g in shapes(model) if body is None or model.geom_bodyid[g] == body]
+    return min((-geom_reach(model, data, g, DOWN) for g in own), default=np.inf)
 
 
 def body_length(

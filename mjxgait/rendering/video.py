@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 
 from mjxgait.errors import UserError
 from mjxgait.extras import install_command
-from mjxgait.files import replaced, writing
+from mjxgait.files import replaced, require_ending, writing
 from mjxgait.rendering.floor import DARK_INK, font
 from mjxgait.rendering.gl import gl_pictures
 from mjxgait.rendering.stage import Stage
@@ -102,7 +102,7 @@ def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
     Raises:
       UserError: another format, MP4 without the extra, or a file that cannot be written.
     """
-    _require_format(path, VIDEOS)
+    require_ending(path, VIDEOS)
     writers = {".mp4": _write_mp4, ".webp": _write_webp, ".gif": _write_gif}
     write = writers[path.suffix.lower()]
     with writing(path), replaced(path) as beside:
@@ -117,16 +117,10 @@ def require_writer(path: Path, stills: bool = False) -> None:
     Raises:
       UserError: see `write_video`.
     """
-    _require_format(path, (*VIDEOS, STILL) if stills else VIDEOS)
+    require_ending(path, (*VIDEOS, STILL) if stills else VIDEOS)
     if path.suffix.lower() == ".mp4":
         _import_av(path)
     require_output(path)
-
-
-def _require_format(path: Path, formats: Sequence[str]) -> None:
-    if path.suffix.lower() not in formats:
-        endings = ", ".join(formats)
-        raise UserError(f'{path}: cannot write "{path.suffix}"; end the name with {endings}')
 
 
 def _write_webp(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:

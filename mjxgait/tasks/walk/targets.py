@@ -11,7 +11,7 @@ from mjxgait.config.schema import Config
 from mjxgait.config.tables import build, merge, not_none, read_toml
 from mjxgait.controllers.key_poses.config import unhurried
 from mjxgait.creature import Creature
-from mjxgait.creature.geometry import DOWN, geom_reach, posed, shapes
+from mjxgait.creature.geometry import lowest, posed
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.plugins.registry import resolve_config
 from mjxgait.tasks.walk.criteria import SPARE
@@ -239,11 +239,13 @@ def _styled(creature: Creature, config: Config, name: str) -> Config:
 
 
 def lowest_height(creature: Creature) -> float:
-    """Trunk height, in standing heights, at which the level trunk lies on the floor."""
-    model, data = creature.model, posed(creature.model, creature.stand_qpos)
-    own = [g for g in shapes(model) if model.geom_bodyid[g] == creature.trunk]
-    free = min((-geom_reach(model, data, g, DOWN) for g in own), default=0.0)
-    return 1 - max(free, 0.0) / creature.frame.stand_height
+    """Trunk height, in standing heights, at which the level trunk lies on the floor.
+
+    0 for a trunk without a shape that may touch it.
+    """
+    standing = posed(creature.model, creature.stand_qpos)
+    free = lowest(creature.model, standing, creature.trunk) / creature.frame.stand_height
+    return 1 - min(max(free, 0.0), 1.0)
 
 
 def _demanded(config: Config, level: str) -> Config:

@@ -1,5 +1,6 @@
 """Targets of a walk: their fitness terms, footfalls, and command-line values."""
 
+import copy
 import dataclasses
 import itertools
 from pathlib import Path
@@ -42,6 +43,7 @@ from mjxgait.tasks.walk.targets import (
     WalkTargets,
     configured,
     hint,
+    lowest_height,
     speed_of,
     with_targets,
 )
@@ -554,6 +556,10 @@ def test_a_style_asks_no_trunk_to_be_below_the_floor(body: Creature):
         for creature in (body, crawler)
     ]
     assert heights == [0.85, pytest.approx(1.0, abs=1e-3)]
+    bare = copy.copy(crawler.model)
+    bare.geom_contype[bare.geom_bodyid == crawler.trunk] = 0
+    bare.geom_conaffinity[bare.geom_bodyid == crawler.trunk] = 0
+    assert lowest_height(dataclasses.replace(crawler, model=bare)) == 0, "no part of it can lie"
 
 
 def test_anywhere_trains_on_everything_its_certificate_tests(body: Creature):
