@@ -6,8 +6,9 @@
 A pass is the program by which a run evaluates its individuals: controller, drive, physics and
 statistics. Every lane simulates one episode of an individual that treads on the spot, so all lanes
 work until the end and all engines have the same episodes. The engines differ only in the physics:
-`ours` is the lane-major step, `mjx` is MuJoCo's own MJX in JAX. MuJoCo Warp (`impl="warp"` of MJX)
-is excluded: it steps as a whole and leaves no place for stable PD.
+`ours` is the lane-major step, `mjx` is MuJoCo's own MJX in JAX. `warp` is MuJoCo Warp, where it is
+installed: it steps as a whole and leaves no place for stable PD, so it computes the bare step of a
+body that springs hold up (`peers/warp_peer.py`), as long and in as many lanes.
 
 Each row is a process of its own. All compile at the same time; then each is measured alone, one
 after the other. A row that fails or takes too long shows the reason. Prints a Markdown table, and
@@ -32,10 +33,12 @@ import sys
 import time
 from pathlib import Path
 from statistics import mean
-from typing import Any, Literal
+from typing import Any, Literal, TextIO
 
 ENGINES: dict[str, Literal["auto", "mjx"]] = {"ours": "auto", "mjx": "mjx"}
 """Engines, and their names in `rollout.physics`."""
+WARP = "warp"
+"""The engine that is not one of `rollout.physics`."""
 INDIVIDUALS = 64
 """Different individuals; further lanes repeat them."""
 SWING = 4.0
@@ -53,7 +56,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
     parser.add_argument("--name", default="accelerator", help="of the two files in it")
     parser.add_argument("--env", default="tall_quadruped")
-    parser.add_argument("--engines", nargs="+", choices=ENGINES, default=list(ENGINES))
+    parser.add_argument("--engines", nargs="+", choices=(*ENGINES, WARP), default=list(ENGINES))
     parser.add_argument("--lanes", nargs="+", type=int, default=[1024, 4096, 16384, 65536])
     parser.add_argument("--seconds", type=float, default=0.8, help="of an episode")
     parser.add_argument("--passes", type=float, default=3.0, help="s for which passes are timed")
@@ -113,6 +116,10 @@ def measure(options: argparse.Namespace, engine: str, lanes: str) -> None:
     # Libraries print to standard error, so that only answers are read.
     said = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
+    if engine == WARP:
+        found = measure_warp(options, int(lanes), said)
+        said.write(json.dumps(found) + "\n")
+        return
     # Imported here: the parent process needs neither JAX nor the card.
     import jax
 
@@ -149,6 +156,32 @@ def measure(options: argparse.Namespace, engine: str, lanes: str) -> None:
         "devices": jax.device_count(),
     }
     said.write(json.dumps(found) + "\n")
+
+
+def measure_warp(options: argparse.Namespace, lanes: int, said: TextIO) -> dict[str, Any]:
+    """Report the compilation; measure after a line on standard input, and return the result."""
+    from peers.warp_peer import WarpPeer
+
+    from mjxgait.config.layers import find_creature
+    from mjxgait.creature import load_creature
+
+    creature = load_creature(find_creature(options.env))
+    steps = round(options.seconds / creature.evolution_model.opt.timestep)
+    peer = WarpPeer(creature, lanes, steps)
+    said.write(json.dumps({"compile": peer.compile_s}) + "\n")
+    sys.stdin.readline()
+    peer.lap()
+    seconds, power = passes(peer.lap, options.passes)
+    rate = lanes * steps / min(seconds)
+    return {
+        "compile": peer.compile_s,
+        "steps/s": rate,
+        "us": 1e6 * min(seconds) / steps,
+        "W": mean(power) if power else None,
+        "J/M": mean(power) * mean(seconds) / (lanes * steps / 1e6) if power else None,
+        "alive": peer.standing,
+        "seconds": seconds,
+    }
 
 
 def workload(options: argparse.Namespace, engine: str, lanes: int) -> tuple[Any, Any]:
