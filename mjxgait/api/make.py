@@ -270,7 +270,7 @@ def evolve(
     For the arguments and errors see `training.loop.train` and `distributed.evolve.evolve`.
     """
     from mjxgait.experiments.ancestors import evolve_ancestors, settings_of_ancestors
-    from mjxgait.experiments.multi_seed import folders_of, is_zoo
+    from mjxgait.experiments.multi_seed import folders_of, is_multi_seed
     from mjxgait.training.initial import united
 
     ancestors = None
@@ -294,7 +294,7 @@ def evolve(
 
     initial = None
     if source:
-        initial = united(folders_of(source) if is_zoo(source) else [source])
+        initial = united(folders_of(source) if is_multi_seed(source) else [source])
     at = resume, generation, None, begin
     return loop.train(folder, creature, config, screen, *at, initial, ancestors)
 

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 PICTURE = "zoo.png"
 
 
-def evolve_zoo(
-    zoo: Path,
+def evolve_seeds(
+    parent: Path,
     output: Output,
     cluster: str | None = None,
     begin: Callable[[], object] = lambda: None,
@@ -41,11 +41,11 @@ def evolve_zoo(
     began, screen = time.perf_counter(), _Screen(output)
     with interruptible() as interrupted, scheduler_at(cluster, output.progress) as scheduler:
         begin()
-        with locked(zoo):
-            stopped, seeds = interrupted.is_set, read_seeds(zoo)
-            folders = seeds.folders(zoo)
+        with locked(parent):
+            stopped, seeds = interrupted.is_set, read_seeds(parent)
+            folders = seeds.folders(parent)
             creature, config = open_run(folders[0])
-            again = command("train", "--resume", zoo, run=folders[0])
+            again = command("train", "--resume", parent, run=folders[0])
             kept, together = config.keep_every, seeds.together
             first = first_genomes(folders, creature, output.say)
             rows = Rows(
@@ -57,31 +57,31 @@ def evolve_zoo(
                 together=together,
             )
             ended = first is not None and rows.to_the_end(scheduler, stopped) is not None
-            ended = ended and examine(zoo, folders, again, screen.examined, stopped)
+            ended = ended and examine(parent, folders, again, screen.examined, stopped)
     if not ended:
         output.console.print(f"interrupted; go on with: {again}")
         return False
-    _leave(zoo, creature.name, folders, output)
+    _leave(parent, creature.name, folders, output)
     output.say(
         f"{time.perf_counter() - began:.0f} s; each is a run: "
-        f"{command('inspect', zoo, run=folders[0])}"
+        f"{command('inspect', parent, run=folders[0])}"
     )
     return True
 
 
-def _leave(zoo: Path, name: str, folders: list[Path], output: Output) -> None:
+def _leave(parent: Path, name: str, folders: list[Path], output: Output) -> None:
     # Matplotlib takes half a second to import.
-    from mjxgait.experiments.seeds_compared import draw_zoo, found_in, size, table
+    from mjxgait.experiments.seeds_compared import draw_seeds, found_in, size, table
     from mjxgait.rendering.curves import figure
 
     found = found_in(folders)
     output.console.print(table(found))
-    with disk_errors(zoo / PICTURE), figure(size(found)) as drawing:
-        draw_zoo(drawing, name, found)
-        with replaced(zoo / PICTURE) as beside:
+    with disk_errors(parent / PICTURE), figure(size(found)) as drawing:
+        draw_seeds(drawing, name, found)
+        with replaced(parent / PICTURE) as beside:
             drawing.savefig(beside)
     count = sum(one.certified for one in found)
-    output.console.print(f"{count} of {len(found)} are certified: {zoo / PICTURE}")
+    output.console.print(f"{count} of {len(found)} are certified: {parent / PICTURE}")
     tried = [one for one in found if one.margin is not None]
     if tried and not count:
         nearest = max(tried, key=lambda one: one.margin or 0.0)

@@ -9,7 +9,7 @@ import tyro
 
 from mjxgait.cli.options import Verbosity, parsed
 from mjxgait.errors import UserError
-from mjxgait.experiments.multi_seed import folders_of, is_zoo
+from mjxgait.experiments.multi_seed import folders_of, is_multi_seed
 from mjxgait.kinds import tasks
 from mjxgait.training.folder import open_run
 
@@ -102,7 +102,7 @@ def _evolve(options: GalleryOptions, study: Path) -> int:
     from mjxgait.cli.train import train_command
 
     quiet = ["--quiet"] if options.quiet else []
-    if is_zoo(study):
+    if is_multi_seed(study):
         _check_same(options, study)
         return train_command(["--resume", str(study), *quiet])
     given = {

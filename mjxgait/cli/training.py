@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from mjxgait.api import Run, load_creature
 from mjxgait.api.make import attempts, evolve
-from mjxgait.api.multi_seed import evolve_zoo
+from mjxgait.api.multi_seed import evolve_seeds
 from mjxgait.cli.options import parsed
 from mjxgait.cli.train_options import TrainOptions, options_of
 from mjxgait.config.layers import shipped_creatures
@@ -20,7 +20,12 @@ from mjxgait.controllers.expressions.written import with_expressions
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import at_step, parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.experiments.multi_seed import check_zoo, create_zoo, folders_of, is_zoo
+from mjxgait.experiments.multi_seed import (
+    check_multi_seed,
+    create_multi_seed,
+    folders_of,
+    is_multi_seed,
+)
 from mjxgait.output import Output
 from mjxgait.plugins.registry import meant
 from mjxgait.tasks.walk.targets import (
@@ -70,7 +75,7 @@ def train(arguments: Sequence[str]) -> int:
     mine = options.resume is None and options.env not in shipped_creatures()
     if mine and config.use.task == "walk" and not options.quiet:
         _tell_limits(creature)
-    if options.runs is not None or _is_zoo(options.resume):
+    if options.runs is not None or _is_multi_seed(options.resume):
         return _several(options, creature, config, default)
     if options.generation is not None and options.resume is None:
         raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
@@ -159,13 +164,13 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
         assert options.runs is not None
         # On a cluster each run is a job of its own, so that every machine gets work.
         together = 1 if options.cluster else 0
-        zoo = check_zoo(options.out, creature, config, options.runs)
+        parent = check_multi_seed(options.out, creature, config, options.runs)
         if config.evolution.ancestors.runs:
             from mjxgait.experiments.ancestors import settings_of_ancestors  # leads to JAX
 
             settings_of_ancestors(creature, config)
-        begin = partial(create_zoo, zoo, creature, config, options.runs, together)
-        ended = evolve_zoo(zoo, output, options.cluster, begin)
+        begin = partial(create_multi_seed, parent, creature, config, options.runs, together)
+        ended = evolve_seeds(parent, output, options.cluster, begin)
         return 0 if ended else INTERRUPTED
     other = options.scale or options.way != "forward"
     if options.runs is not None or other or config != default:
@@ -173,11 +178,11 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
             f"{options.resume}: resumed runs keep their number, body and settings; only --cluster "
             "may be given"
         )
-    return 0 if evolve_zoo(options.resume, output, options.cluster) else INTERRUPTED
+    return 0 if evolve_seeds(options.resume, output, options.cluster) else INTERRUPTED
 
 
-def _is_zoo(folder: Path | None) -> bool:
-    return folder is not None and is_zoo(folder)
+def _is_multi_seed(folder: Path | None) -> bool:
+    return folder is not None and is_multi_seed(folder)
 
 
 def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
@@ -239,7 +244,7 @@ def _layers(
                     "out"
                 )
         folder = Path(given.resume)
-        return open_run(folders_of(folder)[0] if is_zoo(folder) else folder)
+        return open_run(folders_of(folder)[0] if is_multi_seed(folder) else folder)
     scales = parse_scales(given.scale or ())
     way = given.way or "forward"
     creature = load_creature(given.env or TrainOptions.env, scales, tell, way)

@@ -70,7 +70,7 @@ def proportional_parents(
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Nursery:
+class SequentialBreeding:
     """Sequential breeding of a generation's children. config: plain or traced; shapes are plain."""
 
     config: EvolutionConfig

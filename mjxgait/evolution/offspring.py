@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.evolution.breeding import Nursery, parents, proportional_parents
+from mjxgait.evolution.breeding import SequentialBreeding, parents, proportional_parents
 from mjxgait.evolution.state import EvolutionState, Origin
 from mjxgait.evolution.variation import Variation
 from mjxgait.types import choose
@@ -19,7 +19,7 @@ def children(
     """Return genomes [M, ...], origins and mothers' places; no places in sequential breeding."""
     count = config.offspring
     if config.pool == "growing" or config.unique_children:
-        bred, of_two = Nursery(config, variation).children(key, state.genomes)
+        bred, of_two = SequentialBreeding(config, variation).children(key, state.genomes)
         return bred, jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION)), None
     key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
     if config.proportional:

@@ -16,7 +16,7 @@ from mjxgait.distributed.evolve import scheduler_at
 from mjxgait.distributed.jobs import Advanced
 from mjxgait.distributed.rows import Rows
 from mjxgait.errors import UserError
-from mjxgait.experiments.multi_seed import bests, create_zoo, folders_of, is_zoo
+from mjxgait.experiments.multi_seed import bests, create_multi_seed, folders_of, is_multi_seed
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import build_experiment
@@ -42,11 +42,11 @@ def evolve_ancestors(folder: Path, creature: Creature, config: Config, say: Say)
       UserError: the folder cannot be written, or a stored run of it is damaged.
     """
     ancestors, place = config.evolution.ancestors, folder / ANCESTORS
-    if not is_zoo(place):
+    if not is_multi_seed(place):
         if place.exists():  # of a run killed while it made this folder
             with disk_errors(place):
                 shutil.rmtree(place)
-        create_zoo(place, creature, settings_of_ancestors(creature, config), ancestors.runs)
+        create_multi_seed(place, creature, settings_of_ancestors(creature, config), ancestors.runs)
     say(
         f"First {ancestors.runs} runs of the task {ancestors.task}, of "
         f"{ancestors.generations} generations: their best begin this run."

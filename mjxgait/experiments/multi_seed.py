@@ -18,7 +18,7 @@ from mjxgait.training.folder import (
     new_run_folder,
 )
 
-ZOO = "zoo.toml"
+SEEDS_FILE = "zoo.toml"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,34 +32,36 @@ class Seeds:
     seeds: tuple[int, ...]
     together: Whole = 0
 
-    def folders(self, zoo: Path) -> list[Path]:
+    def folders(self, parent: Path) -> list[Path]:
         """Return a run folder per seed."""
-        return [zoo / f"seed{seed}" for seed in self.seeds]
+        return [parent / f"seed{seed}" for seed in self.seeds]
 
 
-def is_zoo(folder: Path) -> bool:
+def is_multi_seed(folder: Path) -> bool:
     """Return whether a folder holds several runs, not one."""
-    return (folder / ZOO).is_file()
+    return (folder / SEEDS_FILE).is_file()
 
 
-def read_seeds(zoo: Path) -> Seeds:
+def read_seeds(parent: Path) -> Seeds:
     """Return the seeds of a folder.
 
     Raises:
       UserError: their file cannot be read, or names none.
     """
-    seeds = build(Seeds, read_toml(zoo / ZOO), str(zoo / ZOO))
+    seeds = build(Seeds, read_toml(parent / SEEDS_FILE), str(parent / SEEDS_FILE))
     if not seeds.seeds:
-        raise UserError(f"{zoo / ZOO}: seeds: there is none; list the seed of each folder seedN")
+        raise UserError(
+            f"{parent / SEEDS_FILE}: seeds: there is none; list the seed of each folder seedN"
+        )
     return seeds
 
 
-def folders_of(zoo: Path) -> list[Path]:
+def folders_of(parent: Path) -> list[Path]:
     """Return the run folders; see `read_seeds`."""
-    return read_seeds(zoo).folders(zoo)
+    return read_seeds(parent).folders(parent)
 
 
-def check_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -> Path:
+def check_multi_seed(parent: Path | None, creature: Creature, config: Config, runs: int) -> Path:
     """Return the folder for several new runs, by default a new one under runs/; write nothing.
 
     Raises:
@@ -73,32 +75,32 @@ def check_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -
             " or give --evolution.islands.count 1"
         )
     check_parts(creature, config)
-    zoo = zoo or new_run_folder(f"{creature.name}-zoo", config.seed)
-    check_free(zoo)
-    return zoo
+    parent = parent or new_run_folder(f"{creature.name}-zoo", config.seed)
+    check_free(parent)
+    return parent
 
 
-def create_zoo(
-    zoo: Path | None, creature: Creature, config: Config, runs: int, together: int = 0
+def create_multi_seed(
+    parent: Path | None, creature: Creature, config: Config, runs: int, together: int = 0
 ) -> Path:
     """Make a folder, by default under runs/, with a run folder per seed from the config's on.
 
     together: see `Seeds`.
 
     Raises:
-      UserError: see `check_zoo` and `check_spec`; or the folder cannot be written.
+      UserError: see `check_multi_seed` and `check_spec`; or the folder cannot be written.
     """
     from mjxgait.training.spec import check_spec  # JAX takes a second to import
 
-    zoo = check_zoo(zoo, creature, config, runs)
+    parent = check_multi_seed(parent, creature, config, runs)
     check_spec(creature, config)
     seeds = Seeds(tuple(range(config.seed, config.seed + runs)), together)
-    for seed, folder in zip(seeds.seeds, seeds.folders(zoo), strict=True):
+    for seed, folder in zip(seeds.seeds, seeds.folders(parent), strict=True):
         create_run(folder, creature, to_the_last(dataclasses.replace(config, seed=seed)))
     # Written last: a folder with this file is complete and can be resumed.
-    with disk_errors(zoo):
-        write_text(zoo / ZOO, dump_toml(seeds))
-    return zoo
+    with disk_errors(parent):
+        write_text(parent / SEEDS_FILE, dump_toml(seeds))
+    return parent
 
 
 def to_the_last(config: Config) -> Config:

@@ -59,7 +59,7 @@ def size(found: Sequence[Found]) -> tuple[float, float]:
     return 3.2 * columns, 0.4 + 2.8 * -(-len(found) // columns)
 
 
-def draw_zoo(drawing: Figure, name: str, found: Sequence[Found]) -> None:
+def draw_seeds(drawing: Figure, name: str, found: Sequence[Found]) -> None:
     """Draw all champions as C MuJoCo simulates them, each as large as its picture allows."""
     columns = min(len(found), COLUMNS)
     fields = drawing.subplots(-(-len(found) // columns), columns, squeeze=False)

@@ -9,7 +9,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.errors import UserError
 from mjxgait.physics.derived import OtherTopology, observation_layout
-from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
+from mjxgait.physics.lane_major import UnsupportedModel, lane_major_plant
 from mjxgait.physics.lane_major.model import check_supported
 from mjxgait.types import ModelPlant
 
@@ -36,7 +36,7 @@ def make_plant(
     note = ""
     if physics == "auto":
         try:
-            return fast_plant(model, layout, crossings, padded), 64
+            return lane_major_plant(model, layout, crossings, padded), 64
         except UnsupportedModel as reason:
             note = _cost(reason)
     # MJX and the geometry package that it needs take half a second to import.

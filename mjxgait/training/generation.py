@@ -84,11 +84,11 @@ def propose(
 
     proposals = jax.lax.map(of_row, (rows, states))
     if rows.sources is not None:
-        proposals = with_guests(rows.sources, states, proposals)
+        proposals = with_migrants(rows.sources, states, proposals)
     return proposals, jax.vmap(partial(next_starts, simulator.task))(rows, states)
 
 
-def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal) -> Proposal:
+def with_migrants(sources: jax.Array, states: EvolutionState, proposals: Proposal) -> Proposal:
     """Replace the last children of the proposals [B] by one of the best of each source [B, S].
 
     Rows differ in their settings, so migrants are evaluated again. None migrates before the first

@@ -14,11 +14,11 @@ from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.tasks.walk.target_criteria import (
-    as_asked,
     draw_commands,
     following,
     in_the_way,
     posture,
+    targets_met,
     unrolled,
 )
 
@@ -119,7 +119,7 @@ def test_a_missed_target_names_the_number_in_its_way():
     quick = walk(speed=0.8, period=0.4)
     evaluation = acceptance_of("walk", {"speed": 1.5}).undisturbed(quick, quick, CONFIG)
     assert "1.5 m/s" in in_the_way(evaluation)
-    assert in_the_way([as_asked(walk(), {"speed": 0.8}, CONFIG)]) is None
+    assert in_the_way([targets_met(walk(), {"speed": 0.8}, CONFIG)]) is None
 
 
 def test_the_targets_are_in_the_report():

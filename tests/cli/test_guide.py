@@ -63,7 +63,7 @@ def test_a_command_of_the_guide_is_accepted(command: str, monkeypatch: pytest.Mo
     module = importlib.import_module(f"mjxgait.cli.{file}")
     if words[0] == "train":
         monkeypatch.setattr(module, "evolve", begin)
-        monkeypatch.setattr(module, "evolve_zoo", begin)
+        monkeypatch.setattr(module, "evolve_seeds", begin)
     else:
         parsed = module.parsed
         monkeypatch.setattr(module, "parsed", lambda *given: begin(parsed(*given)))

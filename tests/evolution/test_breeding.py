@@ -12,7 +12,7 @@ from mjxgait.config.schema import Config
 from mjxgait.config.traced import traced
 from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.controllers.key_poses.operators import pose_variation
-from mjxgait.evolution.breeding import Nursery
+from mjxgait.evolution.breeding import SequentialBreeding
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, first_occurrence
 
@@ -42,7 +42,7 @@ def bear(
     """Settings are inputs, as in a run: settings that differ only in numbers compile once."""
     low = jnp.zeros(adults.key_poses.shape[1:])
     box = Box(Genome(low, jnp.zeros(1)), Genome(low + reach, jnp.zeros(1)))
-    return Nursery(settings, pose_variation(box, settings)).children(key, adults)
+    return SequentialBreeding(settings, pose_variation(box, settings)).children(key, adults)
 
 
 POSES = 3

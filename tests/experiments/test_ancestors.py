@@ -13,7 +13,7 @@ from helpers import STOOL, made_up_evaluate, said_by, small_config
 from rich.console import Console
 
 from mjxgait.api.make import evolve, load_creature
-from mjxgait.api.multi_seed import evolve_zoo
+from mjxgait.api.multi_seed import evolve_seeds
 from mjxgait.config.schema import Config
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.creature import Creature
@@ -24,7 +24,7 @@ from mjxgait.experiments.ancestors import (
     first_genomes,
     settings_of_ancestors,
 )
-from mjxgait.experiments.multi_seed import create_zoo, folders_of
+from mjxgait.experiments.multi_seed import create_multi_seed, folders_of
 from mjxgait.output import Output
 from mjxgait.plugins import resolve_config
 from mjxgait.training import stages
@@ -154,7 +154,7 @@ def test_an_interrupted_run_goes_on_with_its_ancestors(
 
 
 def test_several_runs_have_ancestors_of_their_own(tmp_path: Path, stool: Creature):
-    zoo = create_zoo(tmp_path / "zoo", stool, dataclasses.replace(config(), seed=3), 2)
+    zoo = create_multi_seed(tmp_path / "zoo", stool, dataclasses.replace(config(), seed=3), 2)
     folders = folders_of(zoo)
     first = first_genomes(folders, stool, lambda said: None)
     assert first is not None
@@ -181,8 +181,8 @@ def test_runs_side_by_side_begin_with_their_ancestors(
 
     to_the_end = Rows.to_the_end
     monkeypatch.setattr(Rows, "to_the_end", noted)
-    begin = partial(create_zoo, zoo, stool, config(), 2)
-    assert not evolve_zoo(zoo, Output(quiet=True), begin=begin)
+    begin = partial(create_multi_seed, zoo, stool, config(), 2)
+    assert not evolve_seeds(zoo, Output(quiet=True), begin=begin)
     assert begun[:2] == [None, None], "ancestors of one run after another"
     own = [read_initial(folder) or {} for folder in folders_of(zoo)]
     for poses, genomes in zip(begun[2]["genomes.key_poses"], own, strict=True):
@@ -190,7 +190,7 @@ def test_runs_side_by_side_begin_with_their_ancestors(
 
 
 def test_runs_without_ancestors_begin_as_drawn(tmp_path: Path, stool: Creature):
-    zoo = create_zoo(tmp_path / "zoo", stool, config(runs=0), 2)
+    zoo = create_multi_seed(tmp_path / "zoo", stool, config(runs=0), 2)
     assert first_genomes(folders_of(zoo), stool, pytest.fail) == {}
 
 

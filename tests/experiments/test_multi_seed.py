@@ -18,7 +18,7 @@ from mjxgait.champion import write_champion
 from mjxgait.creature import Creature
 from mjxgait.distributed.rows import Rows
 from mjxgait.distributed.scheduler import Scheduler
-from mjxgait.experiments.multi_seed import create_zoo, folders_of, read_seeds
+from mjxgait.experiments.multi_seed import create_multi_seed, folders_of, read_seeds
 from mjxgait.experiments.repertoire.grid import POSES
 from mjxgait.experiments.seeds_compared import found_in
 from mjxgait.training.folder import (
@@ -37,7 +37,7 @@ def begun(zoo: Path, creature: Creature, together: int = 0) -> Path:
     """Begin runs that would each end early if run alone."""
     config = small_config(evolution={"target": 1e-3, "generations": 4}, examination={"every": 2})
     config = dataclasses.replace(config, seed=5, checkpoint_every=1)
-    return create_zoo(zoo, creature, config, len(SEEDS), together)
+    return create_multi_seed(zoo, creature, config, len(SEEDS), together)
 
 
 def go_on(zoo: Path, creature: Creature, kind: type[Scheduler] = Scheduler) -> bool:

@@ -20,7 +20,7 @@ from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.convert import Imported
 from mjxgait.importer.stand_test import stand_test
 from mjxgait.physics.derived import observation_layout
-from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
+from mjxgait.physics.lane_major import UnsupportedModel, lane_major_plant
 from mjxgait.physics.lane_major.model import check_supported
 from mjxgait.physics.lane_major.padded import difference
 from mjxgait.physics.lane_major.topology import Topology
@@ -139,7 +139,7 @@ def test_robot_dogs_share_one_program():
     def topology(name: str) -> Topology:
         creature = load_files(imported_model(name).files)
         known = (creature.evolution_model, observation_layout(creature), find_crossings(creature))
-        return fast_plant(*known, padded=True).topology
+        return lane_major_plant(*known, padded=True).topology
 
     first, *others = (topology(name) for name in DOGS)
     for name, other in zip(DOGS[1:], others, strict=True):

@@ -24,12 +24,12 @@ from many_bodies import (
     varied,
 )
 
-from mjxgait.physics.lane_major import fast_plant
+from mjxgait.physics.lane_major import lane_major_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import Plant
 
 BODIES, STEPS = 6, 80
-PLANTS = {"fast": fast_plant, "mjx": mjx_plant}
+PLANTS = {"fast": lane_major_plant, "mjx": mjx_plant}
 TIGHT = {"fast": 1.0, "mjx": 50.0}
 """Factor on the tolerances of lane-major physics: MJX loses more in single precision."""
 

@@ -10,7 +10,7 @@ from many_bodies import compiled, heavier_model, stacked
 from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.physics.derived import observation_layout
-from mjxgait.physics.lane_major import fast_plant
+from mjxgait.physics.lane_major import lane_major_plant
 from mjxgait.types import BodyState, Plant
 
 
@@ -46,7 +46,7 @@ def quadrupeds() -> list[mujoco.MjModel]:
 def test_variants_of_a_shipped_quadruped_match_c_mujoco(quadrupeds: list[mujoco.MjModel]):
     creature = load_creature(find_creature("tall_quadruped"))
     layout = observation_layout(creature)
-    plant = fast_plant(creature.evolution_model, layout)
+    plant = lane_major_plant(creature.evolution_model, layout)
     numbers = stacked([plant.parameters_of(model, layout) for model in quadrupeds])
     qpos = np.tile(creature.stand_qpos, (4, 1))
     qpos[:, creature.joints.qpos_adr] += 0.1 * np.random.default_rng(1).normal(

@@ -11,7 +11,7 @@ from helpers import STOOL, small_config
 from mjxgait.cli.check import check_command
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import SLOWER, fallback_note, make_plant
-from mjxgait.physics.lane_major import FastPlant
+from mjxgait.physics.lane_major import LaneMajorPlant
 from mjxgait.physics.mjx import MjxPlant
 from mjxgait.training import loop
 
@@ -37,7 +37,7 @@ def test_the_note_names_the_element_and_the_cost(rusty: Path):
 
 def test_there_is_no_note_without_a_fallback(stool: Creature, rusty: Path):
     fast, _ = make_plant(stool, "auto", True)
-    assert isinstance(fast, FastPlant)
+    assert isinstance(fast, LaneMajorPlant)
     assert fast.note == ""
     assert make_plant(load_creature(rusty), "mjx", True)[0].note == ""
     assert fallback_note(stool.evolution_model) == ""

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mjxgait.physics.derived import ObservationLayout
-from mjxgait.physics.lane_major import FastPlant, fast_plant
+from mjxgait.physics.lane_major import LaneMajorPlant, lane_major_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import BodyState
 
@@ -68,7 +68,7 @@ SLIM = {"xla_backend_optimization_level": 0}
 @dataclasses.dataclass
 class Scene:
     model: mujoco.MjModel
-    plant: FastPlant
+    plant: LaneMajorPlant
     layout: ObservationLayout
     state: BodyState
     torque: np.ndarray
@@ -106,7 +106,7 @@ def scene() -> Scene:
     rng = np.random.default_rng(2)
     torque = np.asarray(2 * rng.normal(size=(model.nv, LANES)), np.float32)
     damping = np.asarray(rng.uniform(0, 0.1, (model.nv, LANES)), np.float32)
-    return Scene(model, fast_plant(model, layout), layout, _states(model), torque, damping)
+    return Scene(model, lane_major_plant(model, layout), layout, _states(model), torque, damping)
 
 
 Everything = Callable[[BodyState, Any, Any], Any]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mjxgait.physics.derived import ObservationLayout
-from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
+from mjxgait.physics.lane_major import UnsupportedModel, lane_major_plant
 from mjxgait.physics.lane_major.lanes import sin_cos
 
 FLAG = '<flag eulerdamp="disable"/>'
@@ -43,7 +43,7 @@ def _model(
 
 
 def _plant(model: mujoco.MjModel) -> None:
-    fast_plant(model, ObservationLayout(1, np.array([7]), np.array([6]), np.array([1])))
+    lane_major_plant(model, ObservationLayout(1, np.array([7]), np.array([6]), np.array([1])))
 
 
 def test_accepts_a_plain_creature() -> None:

@@ -21,7 +21,7 @@ from many_bodies import (
 )
 
 from mjxgait.creature.overlap import Crossings, bar_places, pair_depths
-from mjxgait.physics.lane_major import FastPlant, fast_plant
+from mjxgait.physics.lane_major import LaneMajorPlant, lane_major_plant
 
 TOE = '<geom name="toe" class="foot"'
 WELDED = (
@@ -50,8 +50,8 @@ MODELS = [varied(WELDED, seed) for seed in range(4)]
 
 
 @pytest.fixture(scope="module")
-def plant() -> FastPlant:
-    return fast_plant(MODELS[0], layout_of(MODELS[0]))
+def plant() -> LaneMajorPlant:
+    return lane_major_plant(MODELS[0], layout_of(MODELS[0]))
 
 
 def close(ours: Any, theirs: Any, tolerance: float) -> None:
@@ -60,17 +60,17 @@ def close(ours: Any, theirs: Any, tolerance: float) -> None:
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=most)
 
 
-def test_only_bodies_with_joints_remain(plant: FastPlant):
+def test_only_bodies_with_joints_remain(plant: LaneMajorPlant):
     assert len(plant.topology.bodies) == MODELS[0].nbody - 1 - 4
     assert plant.topology.names == ("trunk", "thigh", "shin", "leg", "tail")
 
 
 def test_a_model_without_fixed_bodies_is_unchanged():
     model = mujoco.MjModel.from_xml_string(XML)
-    assert not fast_plant(model, layout_of(model)).topology.welded
+    assert not lane_major_plant(model, layout_of(model)).topology.welded
 
 
-def test_merged_bodies_move_as_in_c_mujoco(plant: FastPlant):
+def test_merged_bodies_move_as_in_c_mujoco(plant: LaneMajorPlant):
     """Four bodies that differ in every number, in lanes of one program."""
     moment = moments(MODELS)
     numbers = stacked([plant.parameters_of(model, layout_of(model)) for model in MODELS])
@@ -91,7 +91,7 @@ def test_merged_bodies_move_as_in_c_mujoco(plant: FastPlant):
     assert touching
 
 
-def test_mass_scales_include_merged_bodies(plant: FastPlant):
+def test_mass_scales_include_merged_bodies(plant: LaneMajorPlant):
     """The weight of a contact on a merged body matches MuJoCo within 1 %."""
     model, factor = MODELS[1], np.linspace(0.6, 1.6, MODELS[1].nbody - 1)
     factor = factor[model.body_weldid[1:] - 1]
@@ -122,7 +122,7 @@ def test_bars_on_merged_bodies_keep_their_places():
         second=np.array([1, 2]),
         allowed=none,
     )
-    moment, plant = moments(MODELS), fast_plant(model, layout_of(model), crossings)
+    moment, plant = moments(MODELS), lane_major_plant(model, layout_of(model), crossings)
     ours = np.asarray(jax.jit(plant.overlap)(moment.for_plant(plant)[0]))
     poses = np.float32(moment.state.qpos)
     theirs = [pair_depths(crossings, *bar_places(model, qpos, crossings)).max() for qpos in poses]

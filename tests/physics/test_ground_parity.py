@@ -18,7 +18,7 @@ from physics.test_fast_parity import LANES, SLIM, _everything, _states
 from mjxgait.creature.ground.spec import Place, parse_ground
 from mjxgait.creature.ground.surface import lay_ground, named_draws
 from mjxgait.physics.derived import ObservationLayout
-from mjxgait.physics.lane_major import fast_plant
+from mjxgait.physics.lane_major import lane_major_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.reference.layout import StartFrame
 from mjxgait.reference.terrain import Terrain
@@ -104,7 +104,7 @@ def plants() -> SimpleNamespace:
         model.body("trunk").id, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], watched
     )
     return SimpleNamespace(
-        fast=fast_plant(model, layout),
+        fast=lane_major_plant(model, layout),
         plain=mjx_plant(model, layout),
         planes=mujoco.MjModel.from_xml_string(own_planes()),
         plane_model=model,

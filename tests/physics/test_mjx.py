@@ -45,7 +45,7 @@ def own_step_is_absent(monkeypatch: pytest.MonkeyPatch) -> None:
     def absent(*_: object, **__: object) -> None:
         raise AssertionError("this program's own step, not MJX")
 
-    monkeypatch.setattr("mjxgait.physics.fast_plant", absent)
+    monkeypatch.setattr("mjxgait.physics.lane_major_plant", absent)
 
 
 def test_a_run_with_mjx_ends_with_a_certificate(

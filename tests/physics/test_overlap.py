@@ -24,7 +24,7 @@ from mjxgait.creature.overlap import (
     pair_depths,
 )
 from mjxgait.physics.derived import observation_layout
-from mjxgait.physics.lane_major import fast_plant
+from mjxgait.physics.lane_major import lane_major_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
 from mjxgait.tasks.falls import Reason
@@ -118,7 +118,7 @@ def test_the_distance_of_two_bars_matches_c_mujoco(kinds: tuple[str, str]):
         assert ours - 0.1 == pytest.approx(theirs, abs=1e-6)
 
 
-@pytest.mark.parametrize("make", [fast_plant, mjx_plant], ids=["fast", "mjx"])
+@pytest.mark.parametrize("make", [lane_major_plant, mjx_plant], ids=["fast", "mjx"])
 def test_both_plants_match_the_overlap_of_c_mujoco(make: Any, stool: Creature, poses: np.ndarray):
     plant = make(stool.evolution_model, observation_layout(stool), find_crossings(stool))
     state = states(stool, poses)

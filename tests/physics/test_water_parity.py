@@ -10,7 +10,7 @@ import pytest
 from many_bodies import SLIM, XML
 
 from mjxgait.physics.derived import ObservationLayout
-from mjxgait.physics.lane_major import fast_plant
+from mjxgait.physics.lane_major import lane_major_plant
 from mjxgait.types import BodyState
 
 FLOOR = '<geom name="floor" type="plane" size="0 0 1" contype="1" friction="0.8" margin="0.002"/>'
@@ -49,7 +49,7 @@ def swim(request: pytest.FixtureRequest) -> SimpleNamespace:
     layout = ObservationLayout(
         trunk, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], np.array([model.geom("leg").id])
     )
-    plant, (state, torque) = fast_plant(model, layout), states(model)
+    plant, (state, torque) = lane_major_plant(model, layout), states(model)
 
     def step(state: BodyState, torque: jax.Array) -> tuple[jax.Array, BodyState]:
         sensed, step_data = plant.forward(state)

@@ -13,14 +13,14 @@ from many_bodies import XML, heavier_model, layout_of, stacked, varied
 
 from mjxgait.creature import Creature
 from mjxgait.physics.derived import observation_layout
-from mjxgait.physics.lane_major import fast_plant
+from mjxgait.physics.lane_major import lane_major_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import Plant
 
 MODELS = [varied(XML, seed) for seed in (3, 4)]
 
 
-PLANTS = {"fast": fast_plant, "mjx": mjx_plant}
+PLANTS = {"fast": lane_major_plant, "mjx": mjx_plant}
 SCALAR = pytest.mark.thorough("a factor per body is compared on MJX, and one for all on the other")
 
 
@@ -93,6 +93,6 @@ MORE = [pytest.param(name, marks=pytest.mark.thorough("another body")) for name 
 def test_shipped_creatures_scale_like_mujoco(shipped: Creature):
     model, layout = shipped.evolution_model, observation_layout(shipped)
     factor = factors(model, 6)
-    plant = fast_plant(model, layout)
+    plant = lane_major_plant(model, layout)
     ours = jax.jit(plant.with_mass_scale)(plant.parameters, jnp.float32(factor))
     assert_same(ours, plant.parameters_of(heavier_model(model, factor), layout))

@@ -10,7 +10,7 @@ from helpers import STOOL
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import make_plant
-from mjxgait.physics.lane_major import FastPlant
+from mjxgait.physics.lane_major import LaneMajorPlant
 from mjxgait.types import BodyState
 
 SECONDS = 1.0
@@ -44,7 +44,7 @@ def on_its_back(creature: Creature) -> BodyState:
 def lowest_after(creature: Creature, touch_ends: bool) -> float:
     """Height in m of the lowest part, one second after the limp creature is put on its back."""
     plant, _ = make_plant(creature, "auto", touch_ends)
-    assert isinstance(plant, FastPlant)
+    assert isinstance(plant, LaneMajorPlant)
     limp = jnp.zeros((creature.model.nv, 1), jnp.float32)
 
     def step(state: BodyState) -> tuple[jax.Array, BodyState]:

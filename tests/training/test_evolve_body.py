@@ -20,7 +20,7 @@ from mjxgait.creature.proportions import grown, proportions
 from mjxgait.evolution.chance import key_of
 from mjxgait.inspect import facts, read_snapshot
 from mjxgait.physics.derived import observation_layout
-from mjxgait.physics.lane_major import fast_plant
+from mjxgait.physics.lane_major import lane_major_plant
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.tasks.starts import draw_starts
@@ -87,10 +87,10 @@ LARGER = pytest.mark.thorough("luxo shows it on nested parts, and the stool on m
     indirect=True,
 )
 def test_a_lanes_body_equals_the_one_in_the_scaled_files(shipped: Creature):
-    compare_with_the_scaled_files(shipped, fast_plant)
+    compare_with_the_scaled_files(shipped, lane_major_plant)
 
 
-@pytest.mark.parametrize("make", [fast_plant, mjx_plant])
+@pytest.mark.parametrize("make", [lane_major_plant, mjx_plant])
 def test_a_lanes_stool_equals_the_scaled_files_in_both_plants(stool: Creature, make: Any):
     compare_with_the_scaled_files(stool, make)
 
@@ -118,7 +118,7 @@ def compare_with_the_scaled_files(shipped: Creature, make: Any) -> None:
 @pytest.mark.parametrize("shipped", ["crab", "luxo"], indirect=True)
 def test_a_grown_body_starts_at_the_height_of_the_scaled_files(shipped: Creature):
     known, sizes = proportions(shipped), some_sizes(shipped, 4)
-    plant = fast_plant(shipped.model, observation_layout(shipped), None)
+    plant = lane_major_plant(shipped.model, observation_layout(shipped), None)
     config = mjxgait.config.schema.RolloutConfig(starts=1)
     start = jax.tree.map(lambda x: x[0], draw_starts(key_of(0), shipped, config))
     # Only the position is compiled; the body's other numbers take the compiler ten seconds.
@@ -134,7 +134,9 @@ def test_a_grown_body_starts_at_the_height_of_the_scaled_files(shipped: Creature
 
 def test_watched_bars_grow_with_their_parts(stool: Creature):
     """Equal factors scale every depth equally."""
-    plant = fast_plant(stool.evolution_model, observation_layout(stool), find_crossings(stool))
+    plant = lane_major_plant(
+        stool.evolution_model, observation_layout(stool), find_crossings(stool)
+    )
     assert plant.topology.first
     grew = jax.jit(plant.with_length_scale)(plant.parameters, jnp.full(stool.model.nbody - 1, 1.2))
     for name in ("centre", "half", "radius", "reach"):

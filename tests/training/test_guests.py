@@ -14,7 +14,7 @@ from mjxgait.creature import Creature
 from mjxgait.evolution.state import EvolutionState, Proposal
 from mjxgait.training import generation
 from mjxgait.training.experiment import build_batch
-from mjxgait.training.generation import SENT, with_guests
+from mjxgait.training.generation import SENT, with_migrants
 
 ROWS, POPULATION, CHILDREN = 3, 6, 5
 
@@ -38,7 +38,7 @@ def children(sources: list[list[int]], age: int) -> Proposal:
         origin=jnp.ones((ROWS, CHILDREN), jnp.int32),
         born=jnp.full((ROWS, CHILDREN), age + 1),
     )
-    return with_guests(jnp.int32(sources), states(age), nobody)
+    return with_migrants(jnp.int32(sources), states(age), nobody)
 
 
 def test_a_migrant_from_each_source_replaces_a_last_child():
@@ -80,7 +80,7 @@ def test_migrants_enter_the_proposals_of_rows_with_sources(
         seated.append((sources.shape, proposals.offspring.key_poses.shape[:2]))
         return proposals
 
-    monkeypatch.setattr(generation, "with_guests", noted)
+    monkeypatch.setattr(generation, "with_migrants", noted)
     for sources in ([], [[1], [0, 2], [1]]):
         batch = build_batch(stool, small_configs, sources=sources)
         proposed = partial(generation.propose, batch.experiments[0].spec, None)

@@ -12,7 +12,7 @@ from helpers import STOOL, program_text, small_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.physics.derived import observation_layout
-from mjxgait.physics.lane_major import fast_plant
+from mjxgait.physics.lane_major import lane_major_plant
 from mjxgait.training.experiment import Batch, build_experiment
 from mjxgait.training.simulator import BodyParams
 from mjxgait.types import BodyState
@@ -80,7 +80,7 @@ def test_a_shape_more_needs_no_program_of_its_own(stools: str, stool: Creature, 
 def test_padding_does_not_change_results(tmp_path: Path):
     creature = saddled(shutil.copytree(STOOL, tmp_path / "other"))
     known = (creature.evolution_model, observation_layout(creature), find_crossings(creature))
-    tight, padded = fast_plant(*known), fast_plant(*known, padded=True)
+    tight, padded = lane_major_plant(*known), lane_major_plant(*known, padded=True)
     rng, lanes = np.random.default_rng(0), 8
     qpos = np.tile(creature.stand_qpos[:, None], lanes)
     qpos[creature.joints.qpos_adr] += rng.normal(size=(len(creature.joints.qpos_adr), lanes))

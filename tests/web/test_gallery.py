@@ -19,7 +19,7 @@ from web.browser import wait_until, watched_tab
 import mjxgait
 from mjxgait.config.tables import dump_toml
 from mjxgait.errors import UserError
-from mjxgait.experiments.multi_seed import ZOO, Seeds
+from mjxgait.experiments.multi_seed import SEEDS_FILE, Seeds
 from mjxgait.files import write_text
 from mjxgait.rendering.gallery import Entry, by_strategy
 from mjxgait.training.folder import CHAMPION
@@ -169,7 +169,7 @@ def test_runs_that_are_there_are_not_made_again_otherwise(
 ):
     study = tmp_path / "study"
     shutil.copytree(runs, study)
-    write_text(study / ZOO, dump_toml(Seeds((0, 1))))
+    write_text(study / SEEDS_FILE, dump_toml(Seeds((0, 1))))
     given = {"task": "walk", "study": study, option: value}
     words = [word for name, one in given.items() for word in (f"--{name}", one)]
     said = said_by(capsys, "gallery", *words, code=2)

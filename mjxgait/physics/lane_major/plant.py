@@ -77,7 +77,7 @@ class StepData:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class FastPlant:
+class LaneMajorPlant:
     """One MuJoCo step with the lanes innermost; see the package's docstring.
 
     parameters: of the body that all lanes share. In NumPy they are constants of the program, else
@@ -99,7 +99,7 @@ class FastPlant:
     ) -> Parameters:
         """See `ModelPlant.parameters_of`."""
         try:
-            other = fast_plant(model, layout, crossings, padded=self.topology.open_pairs)
+            other = lane_major_plant(model, layout, crossings, padded=self.topology.open_pairs)
             reason = difference(self.topology, other.topology)
         except UnsupportedModel as error:
             reason = f"the fast physics does not know this: {error}"
@@ -338,12 +338,12 @@ def take(rows: jax.Array, addresses: Sequence[int]) -> jax.Array:
     return jnp.stack([rows[a] for a in addresses])
 
 
-def fast_plant(
+def lane_major_plant(
     model: mujoco.MjModel,
     layout: ObservationLayout,
     crossings: Crossings | None = None,
     padded: bool = False,
-) -> FastPlant:
+) -> LaneMajorPlant:
     """Make a plant for a model that the lane-major physics supports.
 
     Args:
@@ -356,4 +356,4 @@ def fast_plant(
     topology, parameters = read_topology(*seen), read_parameters(*seen)
     if padded:
         topology, parameters = make_room(topology, parameters, layout.feet)
-    return FastPlant(topology, parameters)
+    return LaneMajorPlant(topology, parameters)

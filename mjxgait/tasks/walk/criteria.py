@@ -51,13 +51,13 @@ from mjxgait.reference.measure import (
 from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.tasks.walk.gaits import gait_of, transition
 from mjxgait.tasks.walk.target_criteria import (
-    as_asked,
     commanded_heading,
     draw_commands,
     following,
     heading_off,
     posture,
     steered,
+    targets_met,
     unrolled,
 )
 
@@ -118,7 +118,7 @@ class WalkCriteria(StaysUp):
         config = following(config, self.wish, whole.dimensions)
         whole, halved = (unrolled(recording, self.wish) for recording in (whole, halved))
         window = whole.window(config.warmup)
-        targets = (as_asked(window, self.wish, config),) if self.wish else ()
+        targets = (targets_met(window, self.wish, config),) if self.wish else ()
         return (
             *basic(whole, config),
             half_step(whole, halved, config),

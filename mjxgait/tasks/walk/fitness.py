@@ -171,7 +171,7 @@ UNLIKE = {"stride": 0.15, "duty_factor": 0.15, "reach": 0.1, "pitch": 5.0}
 """Likewise for the animal measures: relative, relative, hip heights, deg."""
 
 
-def wished_terms(
+def target_terms(
     creature: Body, config: WalkConfig, step: float, horizon: int, stats: TargetStats
 ) -> dict[str, jax.Array]:
     """Return the terms [] of one episode; the module docstring describes their weighted sum."""

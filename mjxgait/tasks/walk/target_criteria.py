@@ -115,7 +115,7 @@ def unrolled(recording: Recording, wish: Wish) -> Recording:
     return dataclasses.replace(recording, trunk_pos=place, heading=heading)
 
 
-def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criterion:
+def targets_met(window: Recording, wish: Wish, config: CertificateConfig) -> Criterion:
     """10. The walk meets its targets. window: unrolled, after the warm-up."""
     limits = config.wishes
     found = posture(window) | likeness(window, config.gait.clearance)

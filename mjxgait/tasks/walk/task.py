@@ -20,9 +20,9 @@ from mjxgait.tasks.walk.config import TargetConfig, WalkConfig
 from mjxgait.tasks.walk.fitness import (
     fitness_terms,
     signed_weights,
+    target_terms,
     target_weights,
     terms_under,
-    wished_terms,
 )
 from mjxgait.tasks.walk.stats import StatsRecorder, WalkStats
 from mjxgait.tasks.walk.target_stats import (
@@ -194,7 +194,7 @@ class TargetedWalk(Walk):
 
     @override
     def evaluate(self, stats: TargetStats, settings: WalkConfig) -> dict[str, jax.Array]:
-        return wished_terms(self.creature, settings, self.step, self.horizon, stats)
+        return target_terms(self.creature, settings, self.step, self.horizon, stats)
 
     @override
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
