@@ -20,7 +20,7 @@ from mjxgait.creature import Creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.state import Origin
 from mjxgait.evolution.strategy import Normal, SeparableCma, reflected
-from mjxgait.evolution.variation import Box
+from mjxgait.evolution.variation import Box, projected
 
 GENES, CHILDREN = 8, 14
 WIDE = Box(
@@ -191,6 +191,19 @@ def test_body_sizes_are_genes_too(stool: Creature):
     np.testing.assert_allclose(
         box.low.plan.tuning, PoseTracker(stool, 0.005).bounds(PoseConfig())[0].tuning
     )
+
+
+def test_drawn_children_have_the_relations_among_genes_that_bred_ones_have():
+    """A distribution knows only single genes; `Variation.project` relates them."""
+    state = run(ES, 3, has_curriculum=True)[-1][0]
+    upward = projected(
+        ES.variation, lambda genome: dataclasses.replace(genome, key_poses=abs(genome.key_poses))
+    )
+    children, origins, _ = dataclasses.replace(ES, variation=upward)._children(key_of(1), state)
+    assert set(np.asarray(origins)) == {int(Origin.DRAWN)}
+    assert np.all(children.key_poses >= 0)
+    free, _, _ = ES._children(key_of(1), state)
+    np.testing.assert_array_equal(children.key_poses, abs(free.key_poses))
 
 
 def test_too_few_children_are_refused():

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import pydantic
 
 from mjxgait.config.tables import (
+    ADDED,
     SHAPE,
     STRICT,
     Count,
@@ -98,6 +99,8 @@ class PoseConfig:
       key_poses: K, poses of half a cycle (of the whole cycle for an unsymmetric creature).
       mirror: whether the other half of a symmetric creature's cycle is the mirror image; else
         the K poses are the whole cycle.
+      in_phase: whether each pose of a symmetric creature is its own mirror image, so that left and
+        right move together, as in a bound; for `mirror = false`.
       interpolation: n, steps between neighbouring poses.
       steering: factor on the creature's steering weights; turns need more than a straight path.
       advance: the target advances when the pose error is below the threshold, or by the clock.
@@ -111,6 +114,7 @@ class PoseConfig:
     __pydantic_config__ = STRICT
     key_poses: Annotated[int, pydantic.Field(ge=2), SHAPE] = 2
     mirror: bool = True
+    in_phase: Annotated[bool, SHAPE, ADDED] = False
     interpolation: Count = 10
     steering: Annotated[Positive, SHAPE] = 1.0
     advance: Literal["error", "clock"] = "error"

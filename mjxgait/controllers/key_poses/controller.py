@@ -19,7 +19,7 @@ from mjxgait.controllers.base import Command, Senses
 from mjxgait.controllers.key_poses.config import STEPPING, TUNING, PoseConfig
 from mjxgait.controllers.key_poses.operators import pose_variation
 from mjxgait.creature.body import Body
-from mjxgait.evolution.variation import Box, Variation, in_ranges
+from mjxgait.evolution.variation import Box, Variation, in_ranges, projected
 from mjxgait.types import Number, pytree
 
 THRESHOLD, PERIOD, STEER, PITCH, PITCH_RATE, ROLL, ROLL_RATE = range(len(TUNING))
@@ -117,33 +117,35 @@ class PoseTracker:
     def variation(self, settings: PoseConfig, evolution: EvolutionConfig) -> Variation:
         """The first created genome has the key poses of `settings.around`."""
         usual = pose_variation(Box(*self.bounds(settings)), evolution)
-        if not settings.around:
-            return self._swinging(usual) if self.creature.joints.swings else usual
+        if settings.around:
+            created = usual.create
 
-        def create(key: jax.Array, count: int) -> Genome:
-            made = usual.create(key, count)
-            poses = made.key_poses.at[0].set(self._original(settings))
-            return dataclasses.replace(made, key_poses=poses)
+            def create(key: jax.Array, count: int) -> Genome:
+                made = created(key, count)
+                poses = made.key_poses.at[0].set(self._original(settings))
+                return dataclasses.replace(made, key_poses=poses)
 
-        return dataclasses.replace(usual, create=create)
+            usual = dataclasses.replace(usual, create=create)
+        elif self.creature.joints.swings:
+            usual = projected(usual, self._swinging)
+        if settings.in_phase and self.creature.mirror.symmetric:
+            usual = projected(usual, self._in_phase)
+        return usual
 
-    def _swinging(self, usual: Variation) -> Variation:
-        """Return operators after which arms swing with legs (`Joints.swings`)."""
-        joints = self.creature.joints
+    def _swinging(self, genome: Genome) -> Genome:
+        """Return genomes whose arms swing with legs (`Joints.swings`)."""
+        joints, poses = self.creature.joints, genome.key_poses
+        for arm, leg, share in joints.swings:
+            angle = joints.stand[arm] + share * (poses[..., leg] - joints.stand[leg])
+            angle = jnp.clip(angle, joints.pose_low[arm], joints.pose_high[arm])
+            poses = poses.at[..., arm].set(angle)
+        return dataclasses.replace(genome, key_poses=poses)
 
-        def swung(genome: Genome) -> Genome:
-            poses = genome.key_poses
-            for arm, leg, share in joints.swings:
-                angle = joints.stand[arm] + share * (poses[..., leg] - joints.stand[leg])
-                angle = jnp.clip(angle, joints.pose_low[arm], joints.pose_high[arm])
-                poses = poses.at[..., arm].set(angle)
-            return dataclasses.replace(genome, key_poses=poses)
-
-        return dataclasses.replace(
-            usual,
-            create=lambda key, count: swung(usual.create(key, count)),
-            mutate=lambda key, genome: swung(usual.mutate(key, genome)),
-        )
+    def _in_phase(self, genome: Genome) -> Genome:
+        """Return genomes whose poses [..., K, J] are the means of themselves and their images."""
+        mirror, poses = self.creature.mirror, genome.key_poses
+        image = mirror.sign.astype(np.float32) * poses[..., mirror.partner]
+        return dataclasses.replace(genome, key_poses=0.5 * (poses + image))
 
     def genes(self, genomes: Genome, settings: PoseConfig) -> np.ndarray:
         """See `Controller`."""

@@ -26,6 +26,7 @@ class Gait:
     labels: names in the certificate that fulfil it (`certification.describe.gait_name`).
     twice: whether the left does in the second half of a cycle what the right does in the first, as
       with mirrored key poses; if not, the whole cycle must be evolved.
+    together: whether left and right do the same at the same time, so that each pose is symmetric.
     sway: deg of roll, root mean square, that belongs to the gait.
     """
 
@@ -33,6 +34,7 @@ class Gait:
     labels: tuple[str, ...]
     duty: tuple[float, float] = (0.0, 1.0)
     twice: bool = True
+    together: bool = False
     sway: float | None = None
 
 
@@ -91,7 +93,7 @@ GAITS: dict[int, dict[str, Gait]] = {
     2: {
         "walk": Gait(((0.0, 0.5),), ("walk",), _WALKS),
         "waddle": Gait(((0.0, 0.5),), ("walk",), _WALKS, sway=6.0),
-        "hop": Gait(((0.0, 0.0),), ("hop",), twice=False),
+        "hop": Gait(((0.0, 0.0),), ("hop",), twice=False, together=True),
     },
     4: {
         "walk": Gait(_FOUR_BEATS, ("walk", "crawl"), _WALKS),
@@ -101,7 +103,7 @@ GAITS: dict[int, dict[str, Gait]] = {
         "canter": Gait(
             ((0.33, 0.0, 0.67, 0.33), (0.67, 0.33, 0.33, 0.0)), ("canter",), twice=False
         ),
-        "bound": Gait(((0.5, 0.0, 0.5, 0.0),), ("bound",), twice=False),
+        "bound": Gait(((0.5, 0.0, 0.5, 0.0),), ("bound",), twice=False, together=True),
         "gallop": Gait(
             (
                 (0.5, 0.0, 0.65, 0.15),
@@ -113,7 +115,7 @@ GAITS: dict[int, dict[str, Gait]] = {
             _RUNS,
             twice=False,
         ),
-        "hop": Gait(((0.0, 0.0, 0.0, 0.0),), ("pronk",), twice=False),
+        "hop": Gait(((0.0, 0.0, 0.0, 0.0),), ("pronk",), twice=False, together=True),
     },
     6: {
         "walk": Gait(

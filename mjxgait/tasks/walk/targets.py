@@ -206,7 +206,7 @@ def _named(name: str, creature: Creature) -> dict[str, object]:
         gait = gait_of(name, len(creature.feet.names))
     except ValueError as error:
         raise UserError(f"--gait {name}: {creature.name}: {error}, and {NATURAL}") from None
-    whole: dict[str, object] = {"mirror": False, "key_poses": 4}
+    whole: dict[str, object] = {"mirror": False, "key_poses": 4, "in_phase": gait.together}
     wish = {"gait": name} | ({} if gait.sway is None else {"sway": gait.sway})
     return {"fitness": {"wish": wish}} | ({} if gait.twice else {"controller": whole})
 

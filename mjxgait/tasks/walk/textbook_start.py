@@ -56,12 +56,11 @@ def natural_gait(creature: Creature, speed: float) -> str:
 def drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[str, object]:
     """Settings for a textbook cycle of a gait at a speed in m/s.
 
-    The cycle has an animal's strides and duty factor. Empty if the gait has no name, or no second
-    half that mirrors the first.
+    The cycle has an animal's strides and duty factor. Empty if the gait has no name.
     """
-    if name == AUTO or not (gait := gait_of(name, len(creature.feet.names))).twice:
+    if name == AUTO:
         return {}
-    hip = creature.frame.hip_height
+    gait, hip = gait_of(name, len(creature.feet.names)), creature.frame.hip_height
     stride, (least, most) = animal_stride(speed, hip), gait.duty
     falls = Footfalls(
         phases=placed(gait, creature.feet.stations)[0],
@@ -70,7 +69,7 @@ def drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[s
         lift=config.fitness.clearance * hip,
     )
     cycle = textbook_cycle(creature, falls, DRAWN)
-    poses = cycle[: DRAWN // 2] if creature.mirror.symmetric else cycle
+    poses = cycle[: DRAWN // 2] if creature.mirror.symmetric and gait.twice else cycle
     slow, time_step = (1 + SLACK) * stride / speed, float(creature.model.opt.timestep)
     near = {
         "key_poses": len(poses),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers import altered, pose_champion
 
+from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.controllers.key_poses.config import PoseConfig
 from mjxgait.controllers.key_poses.controller import (
     PERIOD,
@@ -129,6 +130,38 @@ def test_without_the_mirror_the_key_poses_are_the_whole_cycle(stool: Creature):
         assert np.allclose(
             interpolate(cycle.poses, jnp.int32(s), 4, cycle.count), expected, atol=1e-6
         )
+
+
+def test_in_phase_left_and_right_move_together(shipped: Creature):
+    """Each new pose is its own mirror image, and children of two such parents are alike."""
+    variation = tracker(shipped).variation(
+        PoseConfig(mirror=False, key_poses=4, in_phase=True), EvolutionConfig()
+    )
+    first = variation.create(jax.random.key(0), 2)
+    mother, father = (jax.tree.map(lambda leaf, i=i: leaf[i], first) for i in range(2))
+    mutant = variation.mutate(jax.random.key(1), mother)
+    assert np.any(mutant.key_poses != mother.key_poses)
+    child = variation.cross(jax.random.key(2), mother, father)
+    for genome in (mother, mutant, child):
+        poses = np.asarray(genome.key_poses)
+        assert np.ptp(poses, axis=0).max() > 0.1
+        np.testing.assert_allclose(poses, shipped.mirror.image(poses), atol=1e-6)
+
+
+def test_in_phase_keeps_what_relates_genes_already(stool: Creature):
+    """Arms that swing with legs go on swinging with them."""
+    joints = dataclasses.replace(stool.joints, swings=((1, 0, 0.5),))
+    count = len(joints.names)
+    alone = dataclasses.replace(
+        stool.mirror, partners=tuple(range(count)), sign=np.ones(count), symmetric=True
+    )
+    body = dataclasses.replace(stool, joints=joints, mirror=alone)
+    variation = tracker(body).variation(PoseConfig(mirror=False, in_phase=True), EvolutionConfig())
+    poses = np.asarray(variation.create(jax.random.key(0), 3).key_poses)
+    swung = joints.stand[1] + 0.5 * (poses[..., 0] - joints.stand[0])
+    np.testing.assert_allclose(
+        poses[..., 1], np.clip(swung, joints.pose_low[1], joints.pose_high[1]), atol=1e-6
+    )
 
 
 def test_the_cycle_advances_only_when_joints_follow(stool: Creature):

@@ -498,18 +498,28 @@ def test_a_named_gait_starts_with_its_own_footfalls(body: Creature):
     cycles = {name: drawn(name) for name in ("walk", "amble", "trot", "pace")}
     assert len(set(cycles.values())) == 4
     assert () not in cycles.values()
-    # Gaits whose halves are no mirror images have no drawn cycle.
-    assert [drawn(name) for name in ("canter", "bound", "gallop")] == [()] * 3
+    # Where the halves are no mirror images the whole cycle is drawn.
+    whole = {name: drawn(name) for name in ("canter", "bound", "gallop", "hop")}
+    assert len(set(whole.values())) == 4
+    assert {len(poses) for poses in whole.values()} == {2 * len(cycles["walk"])}
     assert with_targets(Config(), body, WalkTargets(turn=20.0)).controller.around == ()
 
 
-@pytest.mark.parametrize("name", ["walk", "amble", "trot", "pace"])
+@pytest.mark.parametrize(("name", "together"), [("bound", True), ("hop", True), ("canter", False)])
+def test_in_a_gait_of_pairs_left_and_right_move_together(body: Creature, name: str, together: bool):
+    config = with_targets(Config(), body, WalkTargets(gait=name)).controller
+    assert (config.mirror, config.in_phase) == (False, together)
+    poses = np.array(config.around).reshape(config.key_poses, -1)
+    assert np.allclose(poses, body.mirror.image(poses), atol=1e-4) == together
+
+
+@pytest.mark.parametrize("name", GAITS[4])
 def test_a_drawn_gait_gets_its_own_label(dog_sizes, name: str):
     """The label certification gives to the feet that stand in each pose of the cycle."""
     body = load_creature(data_folder("envs") / "short_quadruped")
     config = with_targets(Config(), body, WalkTargets(gait=name)).controller
-    half = np.array(config.around).reshape(config.key_poses, -1)
-    cycle = np.concatenate([half, body.mirror.image(half)])
+    poses = np.array(config.around).reshape(config.key_poses, -1)
+    cycle = np.concatenate([poses, body.mirror.image(poses)]) if config.mirror else poses
     fine = np.array(
         [
             np.interp(np.arange(64) / 8, np.arange(9), np.append(column, column[0]))
