@@ -27,6 +27,8 @@ class Gait:
     twice: whether the left does in the second half of a cycle what the right does in the first, as
       with mirrored key poses; if not, the whole cycle must be evolved.
     together: whether left and right do the same at the same time, so that each pose is symmetric.
+    stride: of the textbook cycle, as a share of an animal's. Legs that all push at once bounce twice
+    in the time of a walk's stride.
     sway: deg of roll, root mean square, that belongs to the gait.
     """
 
@@ -35,6 +37,7 @@ class Gait:
     duty: tuple[float, float] = (0.0, 1.0)
     twice: bool = True
     together: bool = False
+    stride: float = 1.0
     sway: float | None = None
 
 
@@ -93,7 +96,7 @@ GAITS: dict[int, dict[str, Gait]] = {
     2: {
         "walk": Gait(((0.0, 0.5),), ("walk",), _WALKS),
         "waddle": Gait(((0.0, 0.5),), ("walk",), _WALKS, sway=6.0),
-        "hop": Gait(((0.0, 0.0),), ("hop",), twice=False, together=True),
+        "hop": Gait(((0.0, 0.0),), ("hop",), twice=False, together=True, stride=0.5),
     },
     4: {
         "walk": Gait(_FOUR_BEATS, ("walk", "crawl"), _WALKS),
@@ -115,7 +118,7 @@ GAITS: dict[int, dict[str, Gait]] = {
             _RUNS,
             twice=False,
         ),
-        "hop": Gait(((0.0, 0.0, 0.0, 0.0),), ("pronk",), twice=False, together=True),
+        "hop": Gait(((0.0, 0.0, 0.0, 0.0),), ("pronk",), twice=False, together=True, stride=0.5),
     },
     6: {
         "walk": Gait(

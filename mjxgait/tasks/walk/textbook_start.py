@@ -61,7 +61,7 @@ def drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[s
     if name == AUTO:
         return {}
     gait, hip = gait_of(name, len(creature.feet.names)), creature.frame.hip_height
-    stride, (least, most) = animal_stride(speed, hip), gait.duty
+    stride, (least, most) = gait.stride * animal_stride(speed, hip), gait.duty
     falls = Footfalls(
         phases=placed(gait, creature.feet.stations)[0],
         duty=min(max(animal_duty(speed, hip), least + INSIDE), most - INSIDE),
