@@ -29,6 +29,7 @@ class Gait:
     together: whether left and right do the same at the same time, so that each pose is symmetric.
     stride: of the textbook cycle, as a share of an animal's. Legs that all push at once bounce twice
     in the time of a walk's stride.
+    drawn: whether evolution starts from a textbook cycle; a drawn gallop fell more than random poses.
     sway: deg of roll, root mean square, that belongs to the gait.
     """
 
@@ -38,6 +39,7 @@ class Gait:
     twice: bool = True
     together: bool = False
     stride: float = 1.0
+    drawn: bool = True
     sway: float | None = None
 
 
@@ -117,6 +119,7 @@ GAITS: dict[int, dict[str, Gait]] = {
             ("gallop",),
             _RUNS,
             twice=False,
+            drawn=False,
         ),
         "hop": Gait(((0.0, 0.0, 0.0, 0.0),), ("pronk",), twice=False, together=True, stride=0.5),
     },

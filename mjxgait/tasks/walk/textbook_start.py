@@ -56,11 +56,11 @@ def natural_gait(creature: Creature, speed: float) -> str:
 def drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[str, object]:
     """Settings for a textbook cycle of a gait at a speed in m/s.
 
-    The cycle has an animal's strides and duty factor. Empty if the gait has no name.
+    The cycle has an animal's strides and duty factor. Empty without a name, and for a gallop.
     """
-    if name == AUTO:
+    if name == AUTO or not (gait := gait_of(name, len(creature.feet.names))).drawn:
         return {}
-    gait, hip = gait_of(name, len(creature.feet.names)), creature.frame.hip_height
+    hip = creature.frame.hip_height
     stride, (least, most) = gait.stride * animal_stride(speed, hip), gait.duty
     falls = Footfalls(
         phases=placed(gait, creature.feet.stations)[0],

@@ -499,9 +499,10 @@ def test_a_named_gait_starts_with_its_own_footfalls(body: Creature):
     assert len(set(cycles.values())) == 4
     assert () not in cycles.values()
     # Where the halves are no mirror images the whole cycle is drawn.
-    whole = {name: drawn(name) for name in ("canter", "bound", "gallop", "hop")}
-    assert len(set(whole.values())) == 4
+    whole = {name: drawn(name) for name in ("canter", "bound", "hop")}
+    assert len(set(whole.values())) == 3
     assert {len(poses) for poses in whole.values()} == {2 * len(cycles["walk"])}
+    assert drawn("gallop") == ()
     assert with_targets(Config(), body, WalkTargets(turn=20.0)).controller.around == ()
 
 
@@ -513,7 +514,7 @@ def test_in_a_gait_of_pairs_left_and_right_move_together(body: Creature, name: s
     assert np.allclose(poses, body.mirror.image(poses), atol=1e-4) == together
 
 
-@pytest.mark.parametrize("name", GAITS[4])
+@pytest.mark.parametrize("name", [name for name, gait in GAITS[4].items() if gait.drawn])
 def test_a_drawn_gait_gets_its_own_label(dog_sizes, name: str):
     """The label certification gives to the feet that stand in each pose of the cycle."""
     body = load_creature(data_folder("envs") / "short_quadruped")
