@@ -37,7 +37,7 @@ from peers.gait_reward import GaitReward
 from peers.policy_gradient import AXIS, Agent, Learner, Settings, World
 
 import mjxgait
-from mjxgait.certification import Certificate, certify, nominal_check, rehearse
+from mjxgait.certification import Certificate, certify, nominal_check, trial_run
 from mjxgait.champion import Champion, write_champion
 from mjxgait.config.schema import Config
 from mjxgait.controllers.network.config import READS
@@ -303,7 +303,7 @@ class Training:
         if margin >= wanted:
             margin = min(
                 margin,
-                rehearse(self.creature, champion, exam.draws, wanted=wanted, caution=exam.caution),
+                trial_run(self.creature, champion, exam.draws, wanted=wanted, caution=exam.caution),
             )
         number = champion.origin["generation"]
         print(

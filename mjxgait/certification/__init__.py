@@ -12,7 +12,7 @@ from mjxgait.certification.certificate import (
 )
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, Measure
-from mjxgait.certification.trials import rehearse
+from mjxgait.certification.trials import trial_run
 from mjxgait.certification.validity import (
     outdated,
     read_certificate,
@@ -42,9 +42,9 @@ __all__ = [
     "read_certificate",
     "read_stress",
     "record",
-    "rehearse",
     "stress_in_words",
     "survival",
+    "trial_run",
     "verdict_of",
     "verdict_on",
 ]

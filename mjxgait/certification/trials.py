@@ -158,7 +158,7 @@ def steering_criteria(
     return acceptance.obeyed(outcome, commands, config)
 
 
-def rehearse(
+def trial_run(
     creature: Creature,
     champion: Champion,
     count: int,

@@ -78,7 +78,7 @@ class RestartConfig:
     """A new first population in place of one that has learnt nothing, such as only to stand.
 
     Attributes:
-      every: generations between looks at the best fitness; 0: never.
+      every: generations between comparisons of the best fitness; 0: never.
       below: fitness up to which the best has learnt nothing.
     """
 

@@ -26,7 +26,7 @@ from mjxgait.reference.starts import Starts
 from mjxgait.reference.state import Drive, State, sense
 from mjxgait.reference.terrain import grounded_model
 
-LOOK = 10
+EVERY = 10
 """Control steps between two checks for simulations that can no longer succeed."""
 
 
@@ -95,7 +95,7 @@ class Stepping:
     ) -> Outcome:
         """Run to the end; a fallen simulation stops unless it is recorded.
 
-        heading: [S, T] rad, commanded; None without commands. tell: called every `LOOK` steps with
+        heading: [S, T] rad, commanded; None without commands. tell: called every `EVERY` steps with
         the simulations [S] that can no longer succeed; returns whether all may end.
         """
         count, time_step = len(self.starts), self.creature.model.opt.timestep
@@ -109,7 +109,7 @@ class Stepping:
         for k in range(steps):
             if not len(running):
                 break
-            if tell is not None and k % LOOK == 0 and tell(self.task.lost(seen, self.starts, k)):
+            if tell is not None and k % EVERY == 0 and tell(self.task.lost(seen, self.starts, k)):
                 break
             released = waiting[self.push_step[waiting] == k]
             if len(released) and np.isinf(seen.fell[leader]):

@@ -7,7 +7,7 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from mjxgait.certification import Certificate, NominalCheck, certify, nominal_check, rehearse
+from mjxgait.certification import Certificate, NominalCheck, certify, nominal_check, trial_run
 from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.stress import Stress, stress
 from mjxgait.champion import Champion
@@ -52,7 +52,7 @@ def why_ended(generation: int, margin: float) -> str:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Seen:
+class Validated:
     """A validated champion, before its examination. margin: used to choose."""
 
     champion: Champion
@@ -140,7 +140,7 @@ class Examiner:
             return None
         if self.exams.attempt(name, generation) >= config.examination.attempts:
             return None
-        seen = self._look(champion, wanted, beaten=wanted)
+        seen = self._validated(champion, wanted, beaten=wanted)
         if seen.margin >= wanted and (examined := self._examine(seen, hasty=True)).passed:
             return examined
         self._margins[known] = seen.margin
@@ -158,7 +158,7 @@ class Examiner:
         """
         generation, settings = int(state.generation), self.experiment.config.examination
         known: list[Champion] = []
-        waiting: list[Seen] = []
+        waiting: list[Validated] = []
         tried: list[Examined] = []
         order = self._in_order(state, self.experiment.candidates(state))
         for rank, _ in [one for one in order if one[1] >= 0] or order[:1]:
@@ -167,13 +167,13 @@ class Examiner:
                 known.append(champion)
                 continue
             beaten = max((seen.margin for seen in waiting), default=-np.inf)
-            seen = self._look(champion, 0.0, min(beaten, 0.0))
+            seen = self._validated(champion, 0.0, min(beaten, 0.0))
             if seen.margin < settings.enough:
                 waiting.append(seen)
             elif self._examined(seen, tried) or self._spent(generation):
                 return passed_or_first(tried)
         if not waiting and not tried:
-            waiting = [self._look(champion, np.inf, np.inf) for champion in known[:1]]
+            waiting = [self._validated(champion, np.inf, np.inf) for champion in known[:1]]
         for seen in sorted(waiting, key=lambda seen: -seen.margin):
             if tried and (seen.margin < 0 or self._spent(generation)):
                 break
@@ -181,7 +181,7 @@ class Examiner:
                 break
         return passed_or_first(tried)
 
-    def _examined(self, seen: Seen, tried: list[Examined]) -> bool:
+    def _examined(self, seen: Validated, tried: list[Examined]) -> bool:
         """Examine a champion, append it to `tried`, and return whether it is certified."""
         tried.append(self._examine(seen))
         return tried[-1].certificate.passed
@@ -190,7 +190,7 @@ class Examiner:
         """Return whether the run has no attempt left."""
         return self.exams.taken(generation) >= self.experiment.config.examination.attempts
 
-    def _look(self, champion: Champion, wanted: float, beaten: float) -> Seen:
+    def _validated(self, champion: Champion, wanted: float, beaten: float) -> Validated:
         """Validate the undisturbed walk; if its margin reaches `wanted`, also the disturbed ones.
 
         The disturbed walks stop once a margin of `beaten` is out of reach.
@@ -201,11 +201,11 @@ class Examiner:
         if margin >= wanted:
             draw = self._starts(int(champion.origin["generation"]))
             caution = self.experiment.config.examination.caution
-            rehearsed = rehearse(creature, champion, draw, wanted=beaten, caution=caution)
-            margin = min(margin, rehearsed)
-        return Seen(champion, seen, margin)
+            by_trial_run = trial_run(creature, champion, draw, wanted=beaten, caution=caution)
+            margin = min(margin, by_trial_run)
+        return Validated(champion, seen, margin)
 
-    def _examine(self, seen: Seen, hasty: bool = False) -> Examined:
+    def _examine(self, seen: Validated, hasty: bool = False) -> Examined:
         name, generation = seen.champion.fingerprint, int(seen.champion.origin["generation"])
         attempt = self.exams.attempt(name, generation)
         self.tell(
@@ -259,7 +259,7 @@ class Validation:
 
     def __init__(self, examiner: Examiner) -> None:
         self._examiner = examiner
-        self._seen: Future[Examined | None] | None = None
+        self._result: Future[Examined | None] | None = None
         self._state: EvolutionState | None = None
 
     def due(self, state: EvolutionState) -> bool:
@@ -271,14 +271,14 @@ class Validation:
         """Start a validation if it is due; all earlier results must have been `found`."""
         if not self.due(state):
             return
-        self._state, self._seen = state, Future()
+        self._state, self._result = state, Future()
         self._examiner.examines.clear()
         # Two programs that use all devices would block each other, so pre-screening waits here.
         if self._examiner.prescreen is not None:
-            self._look(self._seen, state)
+            self._validate(self._result, state)
             return
         # A daemon thread: a second Ctrl-C does not wait for it.
-        threading.Thread(target=self._look, args=(self._seen, state), daemon=True).start()
+        threading.Thread(target=self._validate, args=(self._result, state), daemon=True).start()
 
     def found(self, wait: bool) -> tuple[Examined, EvolutionState] | None:
         """Return the certified individual and the state of its generation, once known; else None.
@@ -287,15 +287,15 @@ class Validation:
           wait: wait for the result. During an examination it waits anyway: evolution would compete
             for its cores, and its generations would be discarded if the examination passes.
         """
-        if self._seen is None or self._state is None:
+        if self._result is None or self._state is None:
             return None
-        if not (wait or self._seen.done() or self._examiner.examines.is_set()):
+        if not (wait or self._result.done() or self._examiner.examines.is_set()):
             return None
-        examined, self._seen = self._seen.result(), None
+        examined, self._result = self._result.result(), None
         return None if examined is None else (examined, self._state)
 
-    def _look(self, seen: Future[Examined | None], state: EvolutionState) -> None:
+    def _validate(self, result: Future[Examined | None], state: EvolutionState) -> None:
         try:
-            seen.set_result(self._examiner.early(state))
+            result.set_result(self._examiner.early(state))
         except BaseException as error:
-            seen.set_exception(error)
+            result.set_exception(error)

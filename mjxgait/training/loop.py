@@ -230,14 +230,14 @@ def _evolve(
     individual that ended it, if any.
     """
     config, creature = examiner.experiment.config, examiner.experiment.creature
-    looks, saved, examined = Validation(examiner), generations.generation, None
+    validation, saved, examined = Validation(examiner), generations.generation, None
     state = generations.row()
     while True:
         reason, generation = stop_reason(state, config.evolution), int(state.generation)
         over = reason is not None or interrupted.is_set()
         saves = generation > saved and generation % config.checkpoint_every == 0
         # No checkpoint may be of a generation that validation may still discard.
-        if found := looks.found(wait=over or saves or looks.due(state)):
+        if found := validation.found(wait=over or saves or validation.due(state)):
             examined, state = found
             later, generation = generation, int(state.generation)
             if later > generation:
@@ -254,7 +254,7 @@ def _evolve(
             saved = generation
         if over:
             break
-        looks.begin(state)
+        validation.begin(state)
         state = _generation(folder, examiner.experiment, generations, screen)
     if generation > saved:
         checkpoints.save(state, creature.name, creature.digest)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certification import CertificateConfig, certify, nominal_check, rehearse, trials
+from mjxgait.certification import CertificateConfig, certify, nominal_check, trial_run, trials
 from mjxgait.certification.describe import (
     cost_of_transport,
     describe,
@@ -134,11 +134,11 @@ def test_the_starts_have_every_disturbance_of_the_settings(tiny):
 
 def test_the_trial_run_returns_the_margin_of_criteria_4_and_5(tiny, trotter):
     config = build(CertificateConfig, SMALL, "test")
-    assert rehearse(tiny, trotter, 4, config) == 1.0
+    assert trial_run(tiny, trotter, 4, config) == 1.0
     flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
-    assert rehearse(tiny, flat, 2, config) == pytest.approx(-9.0)
+    assert trial_run(tiny, flat, 2, config) == pytest.approx(-9.0)
     # The first fall puts the wanted margin out of reach.
-    assert -9.0 <= rehearse(tiny, flat, 2, config, wanted=0.0) <= -4.0
+    assert -9.0 <= trial_run(tiny, flat, 2, config, wanted=0.0) <= -4.0
 
 
 def test_the_file_has_the_number_of_examinations_of_the_run(certificate, again):

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certification import CertificateConfig, rehearse, trials
-from mjxgait.certification import trials as rehearsal
+from mjxgait.certification import CertificateConfig, trial_run, trials
 from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
@@ -175,9 +174,9 @@ def test_the_trial_run_lasts_as_long_as_the_examination_without_pushes(
         assert not starts.push.any()
         return became([to((0, 0), (16, goal)) for goal in starts.goal], [np.inf] * len(starts))
 
-    monkeypatch.setattr(rehearsal, "simulate", simulated)
+    monkeypatch.setattr(trials, "simulate", simulated)
     hopper = dataclasses.replace(make_champion(tiny), task="hop")
-    assert rehearse(tiny, hopper, 6) == 1.0
+    assert trial_run(tiny, hopper, 6) == 1.0
     assert tried == [(6, CONFIG.seconds)]
 
 
@@ -217,14 +216,14 @@ def test_the_trial_run_ends_if_the_wanted_margin_is_out_of_reach(
         fell = np.where(np.arange(64) < failing, 1.0, np.inf)
         return became([to((0, 0), (16, goal)) for goal in starts.goal], fell)
 
-    monkeypatch.setattr(rehearsal, "simulate", simulated)
+    monkeypatch.setattr(trials, "simulate", simulated)
     hopper = dataclasses.replace(make_champion(tiny), task="hop")
-    assert rehearse(tiny, hopper, 64, wanted=wanted) == pytest.approx(margin)
+    assert trial_run(tiny, hopper, 64, wanted=wanted) == pytest.approx(margin)
     assert told == ([] if ended is None else [ended])
     share = 1 - failing / 64
     error = (share * (1 - share) / 64) ** 0.5
     if ended is None:
-        cautious = rehearse(tiny, hopper, 64, wanted=-10.0, caution=2.0)
+        cautious = trial_run(tiny, hopper, 64, wanted=-10.0, caution=2.0)
         assert cautious == pytest.approx(margin - 2 * error / 0.1)
 
 

@@ -88,11 +88,11 @@ def state_with(
     )
 
 
-class Looks:
+class Validations:
     """Scripted results of the checks (the last of a list repeats), and a record of the calls."""
 
     def __init__(self) -> None:
-        self.glances, self.rehearsals, self.certificates = [0.3], [0.3], [0.3]
+        self.nominal, self.trial_runs, self.certificates = [0.3], [0.3], [0.3]
         self.requested: list[str] = []
         self.wanted: list[float] = []
         self.cautions: list[float] = []
@@ -104,24 +104,24 @@ class Looks:
 
 
 @pytest.fixture
-def looks(monkeypatch: pytest.MonkeyPatch) -> Looks:
-    said = Looks()
+def validations(monkeypatch: pytest.MonkeyPatch) -> Validations:
+    said = Validations()
 
     def nominal_check(*_: object) -> SimpleNamespace:
-        return SimpleNamespace(margin=said.answer("glance", said.glances))
+        return SimpleNamespace(margin=said.answer("nominal check", said.nominal))
 
     def certify(*_: object, attempts: int, **__: object) -> Certificate:
         return certificate(said.answer("exam", said.certificates), attempts)
 
     monkeypatch.setattr(examination, "nominal_check", nominal_check)
 
-    def rehearse(*args: Any, wanted: float, caution: float) -> float:
+    def trial_run(*args: Any, wanted: float, caution: float) -> float:
         said.starts.append(args[2])
         said.wanted.append(wanted)
         said.cautions.append(caution)
-        return said.answer("rehearsal", said.rehearsals)
+        return said.answer("trial run", said.trial_runs)
 
-    monkeypatch.setattr(examination, "rehearse", rehearse)
+    monkeypatch.setattr(examination, "trial_run", trial_run)
     monkeypatch.setattr(examination, "certify", certify)
     return said
 
@@ -139,10 +139,10 @@ def test_validation_is_due_every_few_generations_but_not_at_the_first():
 
 
 def test_trial_runs_use_the_caution_of_the_settings(
-    experiment: Experiment, looks: Looks, exams: Exams
+    experiment: Experiment, validations: Validations, exams: Exams
 ):
     examiner(experiment, exams, caution=1.5).best(ranked(experiment))
-    assert set(looks.cautions) == {1.5}
+    assert set(validations.cautions) == {1.5}
 
 
 def examiner(experiment: Experiment, exams: Exams, **settings: float | str) -> Examiner:
@@ -159,16 +159,16 @@ def ranked(experiment: Experiment, generation: int = 9) -> EvolutionState:
     )
 
 
-def test_a_promising_best_with_margin_is_certified_and_ends_the_run(experiment, looks, exams):
+def test_a_promising_best_with_margin_is_certified_and_ends_the_run(experiment, validations, exams):
     examined = examiner(experiment, exams).early(state_with(experiment, 3))
     assert examined is not None
-    assert looks.requested == ["glance", "rehearsal", "exam"]
+    assert validations.requested == ["nominal check", "trial run", "exam"]
     assert examined.certificate.margin == pytest.approx(0.3)
     assert examined.champion.origin["generation"] == 3
 
 
 @pytest.mark.parametrize(
-    ("generation", "speed", "alive", "nominal_check", "rehearsal", "requested"),
+    ("generation", "speed", "alive", "nominal_check", "trial_margin", "requested"),
     [
         (4, 0.7, 1.0, 0.3, 0.3, 0),  # no validation is due
         (3, 0.55, 1.0, 0.3, 0.3, 0),  # hardly faster than required
@@ -178,53 +178,55 @@ def test_a_promising_best_with_margin_is_certified_and_ends_the_run(experiment, 
     ],
 )
 def test_otherwise_the_run_continues_without_further_checks(
-    experiment, looks, exams, generation, speed, alive, nominal_check, rehearsal, requested
+    experiment, validations, exams, generation, speed, alive, nominal_check, trial_margin, requested
 ):
-    looks.glances, looks.rehearsals = [nominal_check], [rehearsal]
+    validations.nominal, validations.trial_runs = [nominal_check], [trial_margin]
     state = state_with(experiment, generation, speed, alive)
     assert examiner(experiment, exams).early(state) is None
-    assert len(looks.requested) == requested
+    assert len(validations.requested) == requested
     assert exams.taken(9) == 0
 
 
-def test_a_failed_candidate_is_not_validated_again(experiment, looks, exams):
-    looks.rehearsals = [0.1]
+def test_a_failed_candidate_is_not_validated_again(experiment, validations, exams):
+    validations.trial_runs = [0.1]
     same = examiner(experiment, exams)
     for _ in range(2):
         assert same.early(state_with(experiment, 3)) is None
-    assert looks.requested == ["glance", "rehearsal"]
+    assert validations.requested == ["nominal check", "trial run"]
 
 
-def test_in_the_second_half_any_positive_margin_leads_to_an_attempt(experiment, looks, exams):
-    looks.rehearsals = [0.1]
+def test_in_the_second_half_any_positive_margin_leads_to_an_attempt(experiment, validations, exams):
+    validations.trial_runs = [0.1]
     same = examiner(experiment, exams)
     assert same.early(state_with(experiment, 3)) is None
     assert same.early(state_with(experiment, 6)) is not None
-    assert looks.wanted == pytest.approx([0.2, 0.0])
-    looks.rehearsals = [-0.1]
+    assert validations.wanted == pytest.approx([0.2, 0.0])
+    validations.trial_runs = [-0.1]
     assert examiner(experiment, exams).early(state_with(experiment, 6)) is None
 
 
-def test_any_certificate_that_passes_ends_the_run(experiment, looks, exams):
-    looks.certificates = [0.01]
+def test_any_certificate_that_passes_ends_the_run(experiment, validations, exams):
+    validations.certificates = [0.01]
     assert examiner(experiment, exams).early(state_with(experiment, 3)) is not None
 
 
-def test_a_failed_champion_is_not_retried_and_the_next_is_attempt_two(experiment, looks, exams):
-    looks.certificates = [-0.1, 0.3]
+def test_a_failed_champion_is_not_retried_and_the_next_is_attempt_two(
+    experiment, validations, exams
+):
+    validations.certificates = [-0.1, 0.3]
     assert examiner(experiment, exams).early(state_with(experiment, 3)) is None
     # A resumed run reads the failure from the file.
     assert examiner(experiment, exams).early(state_with(experiment, 6)) is None
-    assert looks.requested.count("exam") == 1
+    assert validations.requested.count("exam") == 1
     examined = examiner(experiment, exams).early(other_best(state_with(experiment, 6)))
     assert examined is not None
     assert examined.certificate.attempts == 2
-    assert looks.requested.count("exam") == 2
+    assert validations.requested.count("exam") == 2
 
 
-def test_after_a_failed_certificate_more_starts_choose(experiment, looks, exams):
+def test_after_a_failed_certificate_more_starts_choose(experiment, validations, exams):
     """The one that failed was lucky on the usual draw. What missed that one is tried again."""
-    looks.certificates, looks.rehearsals = [-0.1, 0.3], [0.1, 0.3, 0.3]
+    validations.certificates, validations.trial_runs = [-0.1, 0.3], [0.1, 0.3, 0.3]
     said: list[str] = []
     same = dataclasses.replace(examiner(experiment, exams), tell=said.append)
     missed = other_best(state_with(experiment, 3))
@@ -233,19 +235,19 @@ def test_after_a_failed_certificate_more_starts_choose(experiment, looks, exams)
     assert said[-1] == "Not certified: speed 0.4 (>= 0.5 required)."
     assert same.early(missed) is not None
     draws = experiment.config.examination.draws
-    assert looks.starts == [draws, draws, 4 * draws]
+    assert validations.starts == [draws, draws, 4 * draws]
 
 
-def test_the_second_candidate_is_validated_where_the_first_fails(experiment, looks, exams):
+def test_the_second_candidate_is_validated_where_the_first_fails(experiment, validations, exams):
     state = state_with(experiment, 3)
     both = dataclasses.replace(
         state,
         fitness=state.fitness.at[1].set(-1.0),
         outcome=state.outcome.at[1].set(state.outcome[0]),
     )
-    looks.rehearsals = [-0.1, 0.3]
+    validations.trial_runs = [-0.1, 0.3]
     assert examiner(experiment, exams).early(both) is None
-    looks.requested.clear()
+    validations.requested.clear()
     examined = examiner(experiment, exams, on_the_way=2).early(both)
     assert examined is not None
     assert examined.champion.fitness == -1.0
@@ -269,7 +271,7 @@ class RequestedTrials:
 
 
 def test_level_anywhere_ends_the_run_only_if_the_stress_test_passes(
-    experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
+    experiment, validations, exams, monkeypatch: pytest.MonkeyPatch
 ):
     """The certificate alone ends no run; if it fails, no stress test follows."""
     requested = RequestedTrials(0.5, 0.95)
@@ -281,13 +283,13 @@ def test_level_anywhere_ends_the_run_only_if_the_stress_test_passes(
     assert examined is not None
     assert examined.passed
     assert examined.beyond is not None
-    looks.certificates = [-0.1]
+    validations.certificates = [-0.1]
     assert not examiner(experiment, exams, **anywhere).best(ranked(experiment)).passed
     assert requested.hasty == [True, True]
 
 
 def test_at_the_end_the_whole_second_level_is_tested(
-    experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
+    experiment, validations, exams, monkeypatch: pytest.MonkeyPatch
 ):
     requested = RequestedTrials(0.5)
     monkeypatch.setattr(examination, "stress", requested)
@@ -303,71 +305,75 @@ def other_best(state: EvolutionState) -> EvolutionState:
     return dataclasses.replace(state, genomes=genomes)
 
 
-def test_the_last_attempt_is_kept_for_the_end(experiment, looks, exams):
-    looks.certificates = [-0.1]
+def test_the_last_attempt_is_kept_for_the_end(experiment, validations, exams):
+    validations.certificates = [-0.1]
     state = state_with(experiment, 3)
     two = examiner(experiment, exams, attempts=2)
     assert two.early(state) is None
     assert two.early(other_best(state)) is None
-    assert looks.requested.count("exam") == 1
+    assert validations.requested.count("exam") == 1
     assert two.best(ranked(experiment)).certificate.attempts == 2
 
 
-def test_at_the_end_only_the_first_with_enough_margin_is_certified(experiment, looks, exams):
+def test_at_the_end_only_the_first_with_enough_margin_is_certified(experiment, validations, exams):
     settings = {"candidates": 3, "difference": 0.0}
-    looks.rehearsals = [0.1, 0.25, 0.9]
+    validations.trial_runs = [0.1, 0.25, 0.9]
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
     assert examined.certificate.passed
-    assert looks.requested == ["glance", "rehearsal"] * 2 + ["exam"]
+    assert validations.requested == ["nominal check", "trial run"] * 2 + ["exam"]
     assert examined.champion.fitness == 4.0
 
 
-LOOK = ["glance", "rehearsal"]
+ONE = ["nominal check", "trial run"]
 
 
 @pytest.mark.parametrize(
     ("attempts", "certificates", "requested", "fitness"),
     [
-        (1, [-0.5], [*LOOK * 2, "exam"], 4.0),
-        (2, [-0.5], [*LOOK * 2, "exam", *LOOK, "exam"], 4.0),
-        (3, [-0.5], [*LOOK * 2, "exam", *LOOK, "exam", "exam"], 4.0),
-        (3, [-0.5, 0.3], [*LOOK * 2, "exam", *LOOK, "exam"], 3.0),
-        (3, [-0.5, -0.5, 0.3], [*LOOK * 2, "exam", *LOOK, "exam", "exam"], 5.0),
+        (1, [-0.5], [*ONE * 2, "exam"], 4.0),
+        (2, [-0.5], [*ONE * 2, "exam", *ONE, "exam"], 4.0),
+        (3, [-0.5], [*ONE * 2, "exam", *ONE, "exam", "exam"], 4.0),
+        (3, [-0.5, 0.3], [*ONE * 2, "exam", *ONE, "exam"], 3.0),
+        (3, [-0.5, -0.5, 0.3], [*ONE * 2, "exam", *ONE, "exam", "exam"], 5.0),
     ],
 )
 def test_at_the_end_a_run_uses_its_remaining_attempts(
-    experiment, looks, exams, attempts, certificates, requested, fitness
+    experiment, validations, exams, attempts, certificates, requested, fitness
 ):
     """The second and third candidates have enough margin, the first has a little."""
     settings = {"candidates": 3, "difference": 0.0, "attempts": attempts}
-    looks.rehearsals, looks.certificates = [0.1, 0.25, 0.9], certificates
+    validations.trial_runs, validations.certificates = [0.1, 0.25, 0.9], certificates
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
-    assert looks.requested == requested
+    assert validations.requested == requested
     assert examined.champion.fitness == fitness
-    assert exams.taken(9) == looks.requested.count("exam") <= attempts
+    assert exams.taken(9) == validations.requested.count("exam") <= attempts
 
 
-def test_at_the_end_no_further_candidate_that_would_fail_is_certified(experiment, looks, exams):
+def test_at_the_end_no_further_candidate_that_would_fail_is_certified(
+    experiment, validations, exams
+):
     """A candidate without margin is certified only so that the run has a result."""
     settings = {"candidates": 3, "difference": 0.0}
-    looks.rehearsals, looks.certificates = [-0.3, -0.1, -0.2], [-0.5]
+    validations.trial_runs, validations.certificates = [-0.3, -0.1, -0.2], [-0.5]
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
-    assert looks.requested == [*LOOK * 3, "exam"]
+    assert validations.requested == [*ONE * 3, "exam"]
     assert examined.champion.fitness == 4.0
 
 
-def test_at_the_end_the_best_margin_is_certified_where_none_is_enough(experiment, looks, exams):
+def test_at_the_end_the_best_margin_is_certified_where_none_is_enough(
+    experiment, validations, exams
+):
     settings = {"candidates": 3, "difference": 0.0}
-    looks.glances, looks.rehearsals = [-0.3, 0.3, 0.3], [0.05, 0.15]
+    validations.nominal, validations.trial_runs = [-0.3, 0.3, 0.3], [0.05, 0.15]
     examined = examiner(experiment, exams, **settings).best(ranked(experiment))
     assert examined.champion.fitness == 3.0
     # No disturbed trials after a failed nominal check.
-    assert looks.requested == ["glance", *["glance", "rehearsal"] * 2, "exam"]
+    assert validations.requested == ["nominal check", *["nominal check", "trial run"] * 2, "exam"]
     # A trial run ends once it can neither pass nor exceed the best so far.
-    assert looks.wanted == pytest.approx([-0.3, 0.0])
+    assert validations.wanted == pytest.approx([-0.3, 0.0])
 
 
-def test_during_the_run_the_best_in_prescreening_are_validated(experiment, looks, exams):
+def test_during_the_run_the_best_in_prescreening_are_validated(experiment, validations, exams):
     """Fitness does not matter; candidates below the wanted margin are skipped."""
     state = state_with(experiment, 6)
     all_alike = dataclasses.replace(
@@ -376,40 +382,44 @@ def test_during_the_run_the_best_in_prescreening_are_validated(experiment, looks
         outcome=jnp.tile(state.outcome[:1], (6, 1, 1)),
     )
     settings = {"candidates": 4, "difference": 0.0, "on_the_way": 2}
-    looks.rehearsals = [-0.1]
+    validations.trial_runs = [-0.1]
     same = dataclasses.replace(
         examiner(experiment, exams, **settings), prescreen=Shares(0.8, 0.92, 0.85, 0.95)
     )
     assert same.early(all_alike) is None
-    assert looks.requested == [*LOOK * 2]
-    looks.requested.clear()
+    assert validations.requested == [*ONE * 2]
+    validations.requested.clear()
     one = dataclasses.replace(same, prescreen=Shares(0.8, 0.92, 0.85, 0.85), _margins={})
     assert one.early(all_alike) is None
-    assert looks.requested == LOOK
-    looks.rehearsals = [0.3]
+    assert validations.requested == ONE
+    validations.trial_runs = [0.3]
     examined = dataclasses.replace(same, _margins={}).early(all_alike)
     assert examined.champion.fitness == 2.0
 
 
-def test_at_the_end_prescreening_failures_are_validated_only_if_all_fail(experiment, looks, exams):
+def test_at_the_end_prescreening_failures_are_validated_only_if_all_fail(
+    experiment, validations, exams
+):
     settings = {"candidates": 3, "difference": 0.0}
-    looks.rehearsals = [0.1]
+    validations.trial_runs = [0.1]
     some = dataclasses.replace(
         examiner(experiment, exams, **settings), prescreen=Shares(0.5, 0.95, 0.92)
     )
     assert some.best(ranked(experiment)).champion.fitness == 4.0
-    assert looks.requested == [*LOOK * 2, "exam"]
-    looks.requested.clear()
+    assert validations.requested == [*ONE * 2, "exam"]
+    validations.requested.clear()
     none = dataclasses.replace(
         examiner(experiment, exams, **settings), prescreen=Shares(0.5, 0.6, 0.7)
     )
     assert none.best(ranked(experiment)).champion.fitness == 3.0
-    assert looks.requested == [*LOOK, "exam"]
+    assert validations.requested == [*ONE, "exam"]
 
 
-def test_at_the_end_a_candidate_that_has_failed_before_is_not_chosen(experiment, looks, exams):
+def test_at_the_end_a_candidate_that_has_failed_before_is_not_chosen(
+    experiment, validations, exams
+):
     settings = {"candidates": 2, "difference": 0.0, "attempts": 1}
-    looks.certificates = [-0.1]
+    validations.certificates = [-0.1]
     # The same two candidates in three generations.
     chosen = [
         examiner(experiment, exams, **settings).best(ranked(experiment, generation))
@@ -424,7 +434,7 @@ def test_at_the_end_a_candidate_that_has_failed_before_is_not_chosen(experiment,
 
 
 @pytest.fixture
-def promising(monkeypatch: pytest.MonkeyPatch, looks: Looks) -> None:
+def promising(monkeypatch: pytest.MonkeyPatch, validations: Validations) -> None:
     """All individuals are promising, so that the small run is validated."""
     monkeypatch.setattr(examination, "_promising", lambda *_: True)
 
@@ -476,7 +486,7 @@ def test_generations_evolved_during_a_passing_validation_are_dropped(
     tmp_path: Path,
     experiment: Experiment,
     promising: None,
-    looks: Looks,
+    validations: Validations,
     monkeypatch: pytest.MonkeyPatch,
 ):
     """Whatever ends first, the folder equals that of a run that waited."""
@@ -495,8 +505,8 @@ def test_generations_evolved_during_a_passing_validation_are_dropped(
 
     def never_beside(self: RunLooks, state: EvolutionState) -> None:
         begin(self, state)
-        if self._seen is not None:
-            concurrent.futures.wait([self._seen])
+        if self._result is not None:
+            concurrent.futures.wait([self._result])
 
     for folder in (waited, beside):
         create_run(folder, experiment.creature, experiment.config)
@@ -543,15 +553,15 @@ def test_an_error_in_validation_ends_the_run(
 
 
 def test_a_run_that_never_passes_goes_on_to_the_end(
-    tmp_path: Path, experiment: Experiment, promising: None, looks: Looks
+    tmp_path: Path, experiment: Experiment, promising: None, validations: Validations
 ):
-    looks.certificates, looks.rehearsals = [-0.5], [0.3, 0.4, 0.5]
-    looks.glances = [1.0]
+    validations.certificates, validations.trial_runs = [-0.5], [0.3, 0.4, 0.5]
+    validations.nominal = [1.0]
     folder = tmp_path / "run"
     create_run(folder, experiment.creature, experiment.config)
     said = trained(folder, experiment)
     assert "All 9 generations are done" in said
-    tries = looks.requested.count("exam")
+    tries = validations.requested.count("exam")
     assert 2 <= tries <= experiment.config.examination.attempts
     assert f"This was examination {tries} of its run" in said
     written = (folder / CERTIFICATE).read_text(), (folder / EXAMS).read_text()
