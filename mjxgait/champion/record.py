@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 SCHEMA = 2
 """File version. Version 1 implied key poses and kept the drive in the controller settings."""
 
-SOUGHT = ("around", "within", "expressions")
+SOUGHT = ("around", "within", "in_phase", "expressions")
 """Settings of where the search starts; they do not affect how a champion moves."""
 USUAL = {"steering": 1.0}
 """Settings added later, with the value implied before: older champions keep their fingerprint."""
