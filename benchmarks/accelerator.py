@@ -138,20 +138,14 @@ def measure(options: argparse.Namespace, engine: str, lanes: str) -> None:
     sys.stdin.readline()
     evaluation = jax.block_until_ready(program(*given))
     seconds, power = passes(lambda: jax.block_until_ready(program(*given)), options.passes)
-    steps, fastest = int(evaluation.sim_steps.sum()), min(seconds)
-    joules = mean(power) * mean(seconds) / (steps / 1e6) if power else None
+    steps = int(evaluation.sim_steps.sum())
     outcome = evaluation.outcome[..., experiment.simulator.task.outcomes.index("forward")]
-    found = {
+    found = rates(steps, experiment.simulator.steps, seconds, power) | {
         "compile": compile_s,
-        "steps/s": steps / fastest,
-        "us": 1e6 * fastest / experiment.simulator.steps,
-        "W": mean(power) if power else None,
-        "J/M": joules,
         "alive": 1.0 - float(evaluation.failed.mean()),
         "forward": float(outcome.mean()),
         "steps": steps,
         "computed_steps": int(evaluation.computed_steps.sum()),
-        "seconds": seconds,
         "device": jax.devices()[0].device_kind,
         "devices": jax.device_count(),
     }
@@ -172,14 +166,20 @@ def measure_warp(options: argparse.Namespace, lanes: int, said: TextIO) -> dict[
     sys.stdin.readline()
     peer.lap()
     seconds, power = passes(peer.lap, options.passes)
-    rate = lanes * steps / min(seconds)
+    found = {"compile": peer.compile_s, "alive": peer.standing}
+    return found | rates(lanes * steps, steps, seconds, power)
+
+
+def rates(
+    steps: int, control_steps: int, seconds: list[float], power: list[float]
+) -> dict[str, Any]:
+    """Return rate and energy of passes of `steps` creature-steps in `control_steps` steps."""
+    fastest = min(seconds)
     return {
-        "compile": peer.compile_s,
-        "steps/s": rate,
-        "us": 1e6 * min(seconds) / steps,
+        "steps/s": steps / fastest,
+        "us": 1e6 * fastest / control_steps,
         "W": mean(power) if power else None,
-        "J/M": mean(power) * mean(seconds) / (lanes * steps / 1e6) if power else None,
-        "alive": peer.standing,
+        "J/M": mean(power) * mean(seconds) / (steps / 1e6) if power else None,
         "seconds": seconds,
     }
 

@@ -67,5 +67,5 @@ class WarpPeer:
 
     @property
     def standing(self) -> float:
-        """Share of the worlds whose trunk is above half of its standing height."""
+        """Share of the worlds with a trunk above half of its standing height."""
         return float((self.heights() > 0.5 * self.start.xpos[self.trunk, 2]).mean())

@@ -2,8 +2,7 @@
 
 import abc
 import dataclasses
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 import jax
@@ -228,8 +227,13 @@ class BodiedController:
         whole = None
         if own.box is not None:
             whole = Box(Bodied(own.box.low, box.low), Bodied(own.box.high, box.high))
-        related = None if own.project is None else partial(_with_plan, own.project)
-        return Variation(create, cross, mutate, None, own.long, first, whole, related)
+
+        def project(genomes: Bodied) -> Bodied:
+            return dataclasses.replace(genomes, plan=own.project(genomes.plan))
+
+        return Variation(
+            create, cross, mutate, long=own.long, first=first, box=whole, project=project
+        )
 
     def genes(self, genomes: Bodied, settings: object) -> np.ndarray:
         """See `Controller`."""
@@ -255,8 +259,3 @@ class BodiedController:
     def act(self, plan: object, memory: object, senses: Senses) -> tuple[jax.Array, object]:
         """See `Controller`."""
         return self.controller.act(plan, memory, senses)
-
-
-def _with_plan(project: Callable[[Any], Any], genome: Bodied) -> Bodied:
-    """Return the genome with its controller's part projected."""
-    return dataclasses.replace(genome, plan=project(genome.plan))

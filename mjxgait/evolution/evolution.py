@@ -255,9 +255,7 @@ class Evolution:
             return children(key, self.config, self.variation, state)
         count = self.config.offspring
         drawn = self._strategy.draw(key, state.normal, count)
-        if self.variation.project is not None:
-            drawn = self.variation.project(drawn)
-        return drawn, jnp.full(count, int(Origin.DRAWN)), None
+        return self.variation.project(drawn), jnp.full(count, int(Origin.DRAWN)), None
 
     def _plant(
         self,

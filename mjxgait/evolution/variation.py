@@ -30,6 +30,10 @@ class Box:
     high: Any
 
 
+def _unchanged(genomes: Tree) -> Tree:
+    return genomes
+
+
 @dataclasses.dataclass(frozen=True)
 class Variation(Generic[Genome]):
     """Operators that evolution calls; a genome is only a pytree to them.
@@ -39,8 +43,8 @@ class Variation(Generic[Genome]):
     long: whether they loop along a genome place by place, which justifies some compile time.
     first: genomes [G, ...] that take the first places of the first generation; None: all are drawn.
     box: bounds of genomes of bounded reals; None: the genomes are of another kind.
-    project: genomes [..., ...] -> those with the relations among genes that every new genome has;
-    None: there are none. `create` and `mutate` apply it themselves, a drawn distribution does not.
+    project: genomes [..., ...] -> those with the relations among genes that every new genome has.
+    `create` and `mutate` apply it themselves, a drawn distribution does not.
     """
 
     create: Callable[[jax.Array, int], Genome]
@@ -50,7 +54,7 @@ class Variation(Generic[Genome]):
     long: bool = False
     first: Genome | None = None
     box: Box | None = None
-    project: Callable[[Genome], Genome] | None = None
+    project: Callable[[Genome], Genome] = _unchanged
 
     def begin(self, key: jax.Array, count: int) -> Genome:
         """Return genomes [count, ...] of the first generation: `first`, the rest created."""
@@ -62,12 +66,11 @@ class Variation(Generic[Genome]):
 
 def projected(usual: Variation, project: Callable[[Any], Any]) -> Variation:
     """Return the operators with `project` applied to every genome that they create or mutate."""
-    before = usual.project
     return dataclasses.replace(
         usual,
         create=lambda key, count: project(usual.create(key, count)),
         mutate=lambda key, genome: project(usual.mutate(key, genome)),
-        project=project if before is None else lambda genome: project(before(genome)),
+        project=lambda genomes: project(usual.project(genomes)),
     )
 
 

@@ -133,7 +133,7 @@ class PoseTracker:
         return usual
 
     def _swinging(self, genome: Genome) -> Genome:
-        """Return genomes whose arms swing with legs (`Joints.swings`)."""
+        """Return genomes with arms that swing with legs (`Joints.swings`)."""
         joints, poses = self.creature.joints, genome.key_poses
         for arm, leg, share in joints.swings:
             angle = joints.stand[arm] + share * (poses[..., leg] - joints.stand[leg])
@@ -142,10 +142,10 @@ class PoseTracker:
         return dataclasses.replace(genome, key_poses=poses)
 
     def _in_phase(self, genome: Genome) -> Genome:
-        """Return genomes whose poses [..., K, J] are the means of themselves and their images."""
-        mirror, poses = self.creature.mirror, genome.key_poses
-        image = mirror.sign.astype(np.float32) * poses[..., mirror.partner]
-        return dataclasses.replace(genome, key_poses=0.5 * (poses + image))
+        """Return genomes with the mean of each pose [..., K, J] and its mirror image."""
+        poses = genome.key_poses
+        mean = 0.5 * (poses + mirrored(self.creature, poses))
+        return dataclasses.replace(genome, key_poses=mean)
 
     def genes(self, genomes: Genome, settings: PoseConfig) -> np.ndarray:
         """See `Controller`."""
@@ -200,9 +200,12 @@ def pose_cycle(creature: Body, key_poses: jax.Array) -> jax.Array:
     """Return the cycle [C, J]: key poses [K, J] and, if symmetric, their mirror images."""
     if not creature.mirror.symmetric:
         return key_poses
-    return jnp.concatenate(
-        [key_poses, creature.mirror.sign.astype(np.float32) * key_poses[:, creature.mirror.partner]]
-    )
+    return jnp.concatenate([key_poses, mirrored(creature, key_poses)])
+
+
+def mirrored(creature: Body, poses: jax.Array) -> jax.Array:
+    """Return the mirror images of poses [..., J]."""
+    return poses[..., creature.mirror.partner] * creature.mirror.sign.astype(np.float32)
 
 
 def clock_position(

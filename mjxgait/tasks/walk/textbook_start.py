@@ -56,7 +56,8 @@ def natural_gait(creature: Creature, speed: float) -> str:
 def drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[str, object]:
     """Settings for a textbook cycle of a gait at a speed in m/s.
 
-    The cycle has an animal's strides and duty factor. Empty without a name, and for a gallop.
+    The cycle has an animal's strides and duty factor. Empty without a name, and for a gait
+    that is not `drawn`.
     """
     if name == AUTO or not (gait := gait_of(name, len(creature.feet.names))).drawn:
         return {}

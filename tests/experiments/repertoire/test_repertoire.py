@@ -1,6 +1,6 @@
 """A repertoire of the smallest creature, from the first generation to the files for a game engine.
 
-Stand-in workers evolve it, so that no program is compiled; `test_guests.py` tests the rows.
+Stand-in workers evolve it, so that no program is compiled; `test_migrants.py` tests the rows.
 """
 
 import dataclasses

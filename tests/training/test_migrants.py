@@ -32,13 +32,13 @@ def states(age: int) -> EvolutionState:
 
 
 def children(sources: list[list[int]], age: int) -> Proposal:
-    nobody = Proposal(
+    bred = Proposal(
         key=jnp.zeros(ROWS),
         offspring={"poses": jnp.full((ROWS, CHILDREN, 1), -1.0)},
         origin=jnp.ones((ROWS, CHILDREN), jnp.int32),
         born=jnp.full((ROWS, CHILDREN), age + 1),
     )
-    return with_migrants(jnp.int32(sources), states(age), nobody)
+    return with_migrants(jnp.int32(sources), states(age), bred)
 
 
 def test_a_migrant_from_each_source_replaces_a_last_child():
