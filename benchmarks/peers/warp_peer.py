@@ -5,6 +5,7 @@ and dampers with the creature's gains hold the standing pose instead, and nothin
 rival does less than `ours` and `mjx`.
 """
 
+import copy
 import time
 
 import mujoco
@@ -18,7 +19,7 @@ CONTACTS = 24
 
 def held_model(creature: Creature) -> mujoco.MjModel:
     """Return the evolution model with springs and dampers that hold the standing pose."""
-    model, joints, gains = creature.evolution_model, creature.joints, creature.gains
+    model, joints, gains = copy.copy(creature.evolution_model), creature.joints, creature.gains
     hinges = model.dof_jntid[joints.dof_adr]
     model.jnt_stiffness[hinges], model.qpos_spring[joints.qpos_adr] = gains.kp, joints.stand
     model.dof_damping[joints.dof_adr] = gains.kd
