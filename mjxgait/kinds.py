@@ -55,7 +55,8 @@ class TaskKind:
     task: the class that is traced into the compiled program, a `Task`.
     criteria: the acceptance criteria, a `AcceptanceCriteria`.
     modular: whether it is only for bodies that grow.
-    water: whether these bodies are in water.
+    water: whether these bodies are in water; of a task with skills, in its first.
+    skills: tasks of a body that does each on command, in the order of its effectors.
     called: the user's name for the task; one name may mean one task for a body from a model and
       another for one that grows.
     tables: tables of the certificate's settings that apply only to this task or related ones.
@@ -70,6 +71,7 @@ class TaskKind:
     water: bool = False
     called: str = ""
     tables: tuple[str, ...] = ()
+    skills: tuple[str, ...] = ()
     what: str = ""
 
     def part(self, name: str) -> Any:
@@ -139,6 +141,12 @@ def in_water(task: str) -> bool:
     """Return whether a task takes place in water."""
     kind = known_task(task)
     return kind is not None and kind.water
+
+
+def skills_of(task: str) -> tuple[str, ...]:
+    """Return the tasks that a body does on command; empty for a single task."""
+    kind = known_task(task)
+    return kind.skills if kind else ()
 
 
 def meant_of_grown(task: str) -> str:

@@ -3,16 +3,14 @@
 from mjxgait.certification.certificate import (
     Certificate,
     NominalCheck,
-    certify,
     distance,
-    nominal_check,
     push_ladder,
     record,
     survival,
 )
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, Measure
-from mjxgait.certification.trials import trial_run
+from mjxgait.certification.skills import certify, nominal_check, trial_run
 from mjxgait.certification.validity import (
     outdated,
     read_certificate,

@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import json
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ class Certificate:
 
     champion: fingerprint of the examined champion. report: numbers without a threshold.
     seconds: duration of the examination. attempts: examinations of its run, this one included.
+    skills: certificates of the skills, by task, from which it is made; the file has no such entry.
     """
 
     creature: str
@@ -50,6 +52,7 @@ class Certificate:
     config: CertificateConfig
     seconds: float
     attempts: int = 1
+    skills: "Mapping[str, Certificate]" = dataclasses.field(default_factory=dict)
 
     @property
     def passed(self) -> bool:

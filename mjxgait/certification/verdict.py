@@ -140,8 +140,8 @@ def other_rules(document: Document) -> Iterator[str]:
 
 def _contradiction(document: Document, verdict: Verdict) -> str:
     """Return a sentence if a stored result is not that of its measures; else empty."""
-    said = {c["number"]: c["passed"] for c in document["criteria"]}
-    wrong = [c.number for c in criteria_of(document) if said[c.number] != c.passed]
+    pairs = zip(criteria_of(document), document["criteria"], strict=True)
+    wrong = [criterion.number for criterion, said in pairs if said["passed"] != criterion.passed]
     if document["passed"] == verdict.passed and not wrong:
         return ""
     stored = "passed" if document["passed"] else "failed"

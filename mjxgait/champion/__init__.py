@@ -8,13 +8,17 @@ from mjxgait.champion.record import (
     write_champion,
 )
 from mjxgait.champion.serializers import Serializer, serializer_of
+from mjxgait.champion.skills import SKILLS, by_skill, shown
 
 __all__ = [
+    "SKILLS",
     "Champion",
     "DamagedChampion",
     "Serializer",
+    "by_skill",
     "read_champion",
     "serializer_of",
+    "shown",
     "split_genome",
     "write_champion",
 ]

@@ -35,7 +35,7 @@ SCHEMA = 2
 
 SOUGHT = ("around", "within", "in_phase", "expressions")
 """Settings of where the search starts; they do not affect how a champion moves."""
-USUAL = {"steering": 1.0}
+USUAL = {"steering": 1.0, "skills": 1, "skill": 0}
 """Settings added later, with the value implied before: older champions keep their fingerprint."""
 
 

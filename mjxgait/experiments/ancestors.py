@@ -17,6 +17,7 @@ from mjxgait.distributed.jobs import Advanced
 from mjxgait.distributed.rows import Rows
 from mjxgait.errors import UserError
 from mjxgait.experiments.multi_seed import bests, create_multi_seed, folders_of, is_multi_seed
+from mjxgait.kinds import skills_of
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import build_experiment
@@ -93,7 +94,8 @@ def first_genomes(
 def settings_of_ancestors(creature: Creature, config: Config) -> Config:
     """Return the settings of a run's ancestors with the first seed.
 
-    They are the creature's for that task, with genomes and physics of the run.
+    They are the creature's for that task, with genomes and physics of the run. A skill of the run is
+    evolved by its own effectors.
 
     Raises:
       UserError: the task is unknown, or does not fit.
@@ -104,6 +106,9 @@ def settings_of_ancestors(creature: Creature, config: Config) -> Config:
     check_parts(creature, own)
     names = shape_settings(type(config.controller))
     shape = {name: getattr(config.controller, name) for name in names}
+    skills = skills_of(use.task)
+    if own.use.task in skills:
+        shape["skill"] = skills.index(own.use.task)
     evolution = dataclasses.replace(
         own.evolution,
         population=ancestors.population,

@@ -1,11 +1,13 @@
 """Check that a controller and a task fit the creature."""
 
+from typing import Any
+
 from mjxgait.config.schema import Config
 from mjxgait.controllers.expressions.written import check_programs
 from mjxgait.creature import Creature
 from mjxgait.creature.ground.spec import FLAT
 from mjxgait.errors import UserError
-from mjxgait.kinds import controller_kind, known_task, tasks
+from mjxgait.kinds import controller_kind, known_task, skills_of, tasks
 
 
 def check_fit(creature: Creature, config: Config) -> None:
@@ -86,12 +88,36 @@ def _check_growing(creature: Creature, config: Config) -> None:
             "runs that are compared or resumed have one step"
         )
     _check_settings(name, config)
+    _check_skills(name, config)
+
+
+def _check_skills(name: str, config: Config) -> None:
+    """Refuse trials and effectors that do not suit the number of skills."""
+    skills = skills_of(config.use.task)
+    if not skills:
+        return
+    count, task = len(skills), config.use.task
+    least = 2 * count if "follow" in skills else count
+    if config.rollout.starts < least or config.rollout.starts % count:
+        raise UserError(
+            f"{name}: rollout.starts = {config.rollout.starts}, and the {count} skills of {task} share the "
+            f"trials equally; take a multiple of {count} from {least} on"
+        )
+    own: Any = config.controller
+    if own.skills != count:
+        raise UserError(
+            f"{name}: controller.skills = {own.skills}, and {task} has {count} skills; take "
+            f"--controller.skills {count}"
+        )
+    if config.examination.tryout:
+        raise UserError(f"{name}: {task} has no pre-screening; take --examination.tryout 0")
 
 
 def _check_settings(name: str, config: Config) -> None:
     """Refuse settings that need an existing body, and episodes that end before scoring begins."""
     rollout = config.rollout
-    settle = getattr(config.fitness, "settle", 0.0)
+    skills = [getattr(config.fitness, skill) for skill in skills_of(config.use.task)]
+    settle = max(getattr(one, "settle", 0.0) for one in skills or [config.fitness])
     if settle >= rollout.seconds:
         raise UserError(
             f"{name}: fitness.settle = {settle:g} s do not count, and an episode lasts "

@@ -9,13 +9,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.champion import Champion
+from mjxgait.champion import SKILLS, Champion
 from mjxgait.config.schema import Config
 from mjxgait.config.traced import traced, traced_structure
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
+from mjxgait.kinds import skills_of
 from mjxgait.plugins import make_task
 from mjxgait.plugins.registry import find, what_ends
 from mjxgait.simulation.evaluator import Evaluator
@@ -170,6 +171,10 @@ class Experiment:
             "nominal": dict(zip(task.outcomes, map(float, outcome[rank, 0]), strict=True)),
             "versions": versions,
         }
+        if skills := skills_of(self.config.use.task):
+            # The first trial of each skill is undisturbed.
+            each = [dict(zip(task.outcomes, map(float, one), strict=True)) for one in outcome[rank]]
+            origin[SKILLS] = dict(zip(skills, each, strict=False))
         return Champion.of(
             self.creature,
             self.config,

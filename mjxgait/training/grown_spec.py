@@ -13,9 +13,9 @@ from mjxgait.controllers.sims_brain.operators import Genotype
 from mjxgait.controllers.sims_brain.phenotype import anatomy, body_of
 from mjxgait.controllers.sims_brain.reference_body import DRAG, FRICTION, GRAVITY, HARDEST
 from mjxgait.creature import Creature
-from mjxgait.kinds import in_water
+from mjxgait.kinds import in_water, skills_of
 from mjxgait.physics.batched_trees.plant import TreePlant
-from mjxgait.physics.batched_trees.tree import Surroundings
+from mjxgait.physics.batched_trees.tree import Medium, Surroundings
 from mjxgait.plugins import make_controller, make_task
 from mjxgait.plugins.registry import what_ends
 from mjxgait.simulation.rollout import Simulator
@@ -36,7 +36,10 @@ class GraphGrowth(Growth[TreePlant, Genotype]):
         """Parts without a hinge are not bent; on land bodies rest on the ground."""
         tree = body_of(genome.graph, self.capacity).tree
         bent = start.qpos[7:] * tree.moves[1:]
-        qpos = plant.rested(tree, jnp.concatenate([start.qpos[:7], bent]))
+        qpos = jnp.concatenate([start.qpos[:7], bent])
+        medium: Medium | None = start.ground  # type: ignore[assignment]  # the ground of these
+        rested = plant.rested(tree, qpos)
+        qpos = rested if medium is None else jnp.where(medium.wet > 0, qpos, rested)
         return dataclasses.replace(start, qpos=qpos, numbers=tree)
 
 
@@ -73,14 +76,14 @@ class GrownSpec:
         ends = what_ends(self.creature, config.rollout)
         controller = make_controller(body, step, config)
         task = make_task(body, step, ends, config)
-        wet = in_water(config.use.task)
+        media = {in_water(task) for task in skills_of(config.use.task) or (config.use.task,)}
         around = Surroundings(
             step=step,
             friction=FRICTION,
             contact=HARDEST * step,
-            floor=not wet,
-            gravity=0.0 if wet else GRAVITY,
-            drag=DRAG if wet else 0.0,
+            floor=False in media,
+            gravity=GRAVITY if False in media else 0.0,
+            drag=DRAG if True in media else 0.0,
             lit="light" in task.adds,
         )
         plant, growth = TreePlant(around), GraphGrowth(capacity)

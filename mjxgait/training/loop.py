@@ -50,6 +50,7 @@ from mjxgait.training.initial import (
 from mjxgait.training.lock import locked_run
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
+from mjxgait.training.skill_runs import write_skill_runs
 from mjxgait.training.stages import CompiledGeneration
 
 
@@ -203,9 +204,12 @@ def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examine
         if body.digest != creature.digest:
             write_creature(folder / BODY, body.files)
         write_text(folder / CERTIFICATE, examined.certificate.to_json())
+        skills = write_skill_runs(folder, creature, examined.champion, examined.certificate)
         if examined.beyond:
             write_text(folder / STRESS, examined.beyond.to_json())
     screen.certificate(examined.certificate)
+    if skills:
+        screen.say(f"Each skill can be shown alone: {', '.join(map(str, skills))}.")
 
 
 def report(folder: Path, screen: Screen, reason: str | None, seconds: float) -> None:

@@ -16,17 +16,20 @@ from mjxgait.config.schema import UseConfig
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
-from mjxgait.kinds import tasks
+from mjxgait.kinds import skills_of, tasks
 from mjxgait.plugins import resolve_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import find
 from mjxgait.tasks.plain import PlainTask
+from mjxgait.tasks.walk.gaits import GAITS
 
 ROOT = Path(__file__).parents[2]
 CREATURES, CONFIGS = shipped_creatures(), shipped_configs()
 TASKS = [name for name, kind in tasks().items() if not kind.called]
 """Task names as a user types them."""
 SMALLEST_WALKER = "short_quadruped"
+WITH_GAITS = (SMALLEST_WALKER, "crab", "duck")
+"""A creature on four, six and two feet."""
 STYLES = sorted(path.stem for path in (data_folder("configs") / "styles").glob("*.toml"))
 STUDIES = sorted(path.stem for path in (data_folder("configs") / "ablations").glob("*.toml"))
 BENCHMARKS = sorted(path.name for path in (ROOT / "benchmarks").glob("*.py"))
@@ -42,12 +45,9 @@ FEW_STARTS = ("--rollout.variety", "2")
 """The same if initial conditions change every generation: each needs its own uneven ground."""
 FEW_BLOCKS = (
     *("--controller.nodes", "3", "--controller.parts", "3", "--controller.links", "4"),
-    *("--fitness.settle", "0.1"),
     *("--evolution.ancestors.population", "4", "--evolution.ancestors.generations", "1"),
 )
-"""The same for modular bodies: compile time grows with the padded size, and an episode must be
-longer than settling.
-"""
+"""The same for modular bodies: compile time grows with the padded size."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,6 +58,7 @@ class Way:
     task: str | None = None
     config: str | None = None
     style: str | None = None
+    gait: str | None = None
 
     @property
     def name(self) -> str:
@@ -68,13 +69,20 @@ class Way:
     def arguments(self) -> list[str]:
         """Arguments of `mjxgait train`."""
         given = {"env": self.creature, "task": self.task, "config": self.config}
-        given["style"] = self.style
+        given |= {"style": self.style, "gait": self.gait}
         words = [w for key, value in given.items() if value for w in (f"--{key}", value)]
-        few = FEW_BLOCKS if creature_of(self.creature).settings.creature.grows else ()
+        grows = creature_of(self.creature).settings.creature.grows
+        few = (*FEW_BLOCKS, *_settled_soon(task_of(self))) if grows else ()
         rollout = read_config(self.config).get("rollout", {}) if self.config else {}
         # With the usual seed the best of so few followers is a body without a hinge.
         few += ("--seed", "8") if (self.task, self.config) == ("follow", None) else ()
         return [*words, *few, *(FEW_STARTS if rollout.get("variety", 1) > 1 else ())]
+
+
+def _settled_soon(task: str) -> tuple[str, ...]:
+    """Return options with which an episode of a modular body is longer than settling."""
+    tables = [f"{skill}." for skill in skills_of(task)] or [""]
+    return tuple(word for table in tables for word in (f"--fitness.{table}settle", "0.1"))
 
 
 @functools.cache
@@ -170,3 +178,6 @@ def trainings() -> Iterator[Way]:
                 yield Way(name, None if task == named else task, config)
         if name == smallest(walkers):
             yield from (Way(name, style=style) for style in STYLES)
+        if name in WITH_GAITS:
+            feet = len(creature_of(name).feet.names)
+            yield from (Way(name, gait=gait) for gait in GAITS[feet])

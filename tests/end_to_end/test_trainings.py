@@ -20,6 +20,7 @@ from end_to_end.shipped import (
     STYLES,
     TASKS,
     TINY,
+    WITH_GAITS,
     Way,
     creature_of,
     first_of_each_task,
@@ -35,6 +36,7 @@ from mjxgait.champion import Champion, write_champion
 from mjxgait.controllers.key_poses.config import gene_names
 from mjxgait.kinds import meant_of_grown
 from mjxgait.plugins import resolve_config
+from mjxgait.tasks.walk.gaits import GAITS
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
@@ -55,6 +57,7 @@ TRAINED = {
     "follow-on-land": "tests/tasks/modular/test_roaming.py",
     **dict.fromkeys(("jump", "follow"), "tests/tasks/modular/test_roaming.py"),
     "travel": "tests/tasks/hop/test_travel.py",
+    **dict.fromkeys(("amphibian", "all-trades"), "tests/tasks/modular/test_skills.py"),
 }
 """Tasks that another test evolves, and where.
 
@@ -115,6 +118,8 @@ def test_the_trainings_cover_all_that_is_shipped():
     assert {way.creature for way in WAYS} == set(CREATURES)
     assert {way.config for way in WAYS} - {None} == set(CONFIGS)
     assert {way.style for way in WAYS} - {None} == set(STYLES)
+    on_foot = {len(creature_of(name).feet.names) for name in WITH_GAITS}
+    assert {way.gait for way in WAYS} - {None} == {g for feet in on_foot for g in GAITS[feet]}
     assert {way.task or use_of(way.creature).task for way in WAYS} == set(TASKS)
     assert len(WAYS) == len(set(WAYS))
     thesis = {way.creature for way in WAYS if way.config == "wilson"}

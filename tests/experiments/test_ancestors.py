@@ -238,6 +238,16 @@ def test_followers_come_from_runs_without_a_light():
         assert own.rollout.starts == 1, "the task itself has two"
 
 
+@pytest.mark.parametrize(("before", "skill"), [("swim", 0), ("walk", 1)])
+def test_ancestors_of_several_skills_use_the_effectors_of_theirs(before: str, skill: int):
+    blocks = load_creature("blocks")
+    settings = resolve_config(blocks.settings.train, "blocks", use={"task": "amphibian"})
+    ancestors = dataclasses.replace(settings.evolution.ancestors, task=before)
+    evolution = dataclasses.replace(settings.evolution, ancestors=ancestors)
+    own = settings_of_ancestors(blocks, dataclasses.replace(settings, evolution=evolution))
+    assert (own.controller.skills, own.controller.skill) == (2, skill)
+
+
 @pytest.mark.parametrize(("choice", "drawn"), [(0, 8), (3, 3)])
 def test_ancestors_choose_among_random_bodies(choice: int, drawn: int):
     """0 is the choice of their task. The run itself chooses none."""

@@ -18,7 +18,7 @@ from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.controllers.sims_brain.reference_files import body_xml
 from mjxgait.creature.geometry import DOWN, geom_reach, lowest
 from mjxgait.physics.batched_trees.plant import TreePlant
-from mjxgait.physics.batched_trees.tree import Surroundings
+from mjxgait.physics.batched_trees.tree import Medium, Surroundings
 from mjxgait.tasks.modular.follow import Following, Light
 from mjxgait.tasks.starts import NEVER
 from mjxgait.types import BodyState
@@ -215,6 +215,23 @@ def test_bodies_start_on_the_ground(graphs: Graph, bodies: Body):
         assert low[lane, 2] == pytest.approx(1.0 - lowest(model, data), abs=1e-5)
     same = jax.tree.map(lambda leaf: leaf[0], bodies.tree)
     np.testing.assert_array_equal(wet.rested(same, bent[0]), bent[0])
+
+
+def test_each_lane_may_have_its_own_medium(bodies: Body):
+    """Lanes in water and on land move as in a program for their medium alone."""
+    mixed = dataclasses.replace(ON_LAND, drag=IN_WATER.drag)
+    state, wet = moments(bodies, 0.1), np.arange(LANES) % 2 == 0
+    torque = jnp.zeros_like(state.qvel)
+    both = dataclasses.replace(state, ground=Medium(jnp.float32(wet)))
+    sensed, _, after = stepping(mixed)(both, torque)
+    for around, lanes in ((IN_WATER, wet), (ON_LAND, ~wet)):
+        alone, _, moved = stepping(around)(state, torque)
+        for name in ("qpos", "qvel"):
+            found, expected = (np.asarray(getattr(x, name))[:, lanes] for x in (after, moved))
+            np.testing.assert_allclose(found, expected, rtol=2e-4, atol=2e-4)
+        low, expected = (np.asarray(x.geom_low)[:, lanes] for x in (sensed, alone))
+        np.testing.assert_allclose(low, expected, atol=1e-6)
+    np.testing.assert_array_equal(after.ground.wet, wet)
 
 
 def test_sinking_depth_is_relative_to_block_size(bodies: Body):

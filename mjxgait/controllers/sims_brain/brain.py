@@ -81,8 +81,8 @@ NOTHING, ONE = 0, 1
 class Brain:
     """Brain of a body. kind: [P Q + M]. source: [P Q + M, 3] indices of values; weight: likewise.
 
-    drive: [n] index of the value that drives a link's hinge. gain: [n] its factor. pull: [n] N·m,
-    largest torque (signed). sign: [n] factor from angles to those of the genes. image: [n], -1 in a
+    drive: [S, n] index of the value that drives a link's hinge, by skill. gain: [S, n] its factor.
+    pull: [n] N·m, largest torque (signed). sign: [n] factor from angles to those of the genes. image: [n], -1 in a
     mirror image. lit: [n] index of the link that observes the light for a hinge. steer: [n, 2, 3]
     as in `Nerves`; None without.
     """
@@ -119,13 +119,13 @@ def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
     alive = jnp.repeat(exists, room.local)
     weight = nerves.weight[node].reshape(-1, INPUTS) * alive[:, None]
     part, hinge = body.part, body.hinge
-    code = nerves.effect_source[node[part], hinge]
+    code, gain = (each[node[part], hinge] for each in nerves.effectors)
     return Brain(
         kind=jnp.concatenate([nerves.kind[node].reshape(-1), centre.kind]),
         source=jnp.concatenate([source, central]),
         weight=jnp.concatenate([weight, centre.weight]),
-        drive=places[part, code],
-        gain=nerves.effect_weight[node[part], hinge],
+        drive=places[part[:, None], code].T,
+        gain=gain.T,
         pull=body.strength * body.sign,
         sign=body.sign,
         image=1.0 - 2.0 * parts.copies[part],
@@ -197,10 +197,12 @@ def blank(neurons: int) -> Mind:
     return Mind(none, none)
 
 
-def thought(brain: Brain, mind: Mind, perceived: Perceived, step: float) -> tuple[jax.Array, Mind]:
+def thought(
+    brain: Brain, mind: Mind, perceived: Perceived, step: float, skill: jax.Array | int = 0
+) -> tuple[jax.Array, Mind]:
     """Return the torques [n] in N·m of the hinges, and the next memory. step: s per command.
 
-    All neurons fire at once, on the values of the previous tick.
+    All neurons fire at once, on the values of the previous tick. skill: [] number of the effectors.
     """
     mirrored = jnp.stack([jnp.ones_like(brain.image), brain.image], axis=1)[:, jnp.array([0, 1, 0])]
     ends, angles = jnp.array([0.0, 1.0]), perceived.angles * brain.sign
@@ -210,7 +212,7 @@ def thought(brain: Brain, mind: Mind, perceived: Perceived, step: float) -> tupl
     for _ in range(TICKS):
         inputs = jnp.concatenate([known, values])[brain.source] * brain.weight
         values, memory = fired(brain.kind, inputs, memory, step / TICKS)
-    wanted = brain.gain * jnp.concatenate([known, values])[brain.drive]
+    wanted = brain.gain[skill] * jnp.concatenate([known, values])[brain.drive[skill]]
     if brain.steer is not None:
         added, factor = jnp.sum(brain.steer * light[brain.lit][:, None], axis=2).T
         wanted = wanted * (1 + factor) + added

@@ -44,6 +44,8 @@ class BrainConfig:
         only the weights of `steer` change.
       steer: whether the light's direction also acts on each hinge directly, past the neurons; ours,
         not Sims'.
+      skills: effectors of each hinge, one for every skill of the task; they share body and neurons.
+      skill: number of the effectors that act where the task does not choose them.
     """
 
     __pydantic_config__ = STRICT
@@ -64,7 +66,11 @@ class BrainConfig:
     grafting: Fraction = 0.3
     evolves: Annotated[Literal["all", "brain", "steering"], ADDED] = "all"
     steer: Annotated[bool, SHAPE, ADDED] = False
+    skills: Annotated[Room, ADDED] = 1
+    skill: Annotated[int, pydantic.Field(ge=0), SHAPE, ADDED] = 0
 
     def __post_init__(self) -> None:
         if self.evolves == "steering" and not self.steer:
             raise ValueError('evolves = "steering" needs steer = true')
+        if self.skill >= self.skills:
+            raise ValueError(f"skill = {self.skill} needs skills = {self.skill + 1} or more")

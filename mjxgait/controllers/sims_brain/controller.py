@@ -21,7 +21,7 @@ from mjxgait.creature.body import Body
 from mjxgait.evolution.variation import Variation
 from mjxgait.types import Tree, choose
 
-LIGHT = "light"
+LIGHT, SKILL = "light", "skill"
 
 
 def capacity_of(settings: BrainConfig) -> Capacity:
@@ -50,8 +50,9 @@ class Brains:
     def __init__(self, step: float, settings: BrainConfig, added: Sequence[str] = ()) -> None:
         self.every, self.capacity = settings.every, capacity_of(settings)
         self.pause = step * settings.every
-        self.room = NerveRoom(settings.local, settings.central, settings.steer)
-        self.reads = ("joint_pos", "contact", *([LIGHT] if LIGHT in added else []))
+        self.room = NerveRoom(settings.local, settings.central, settings.steer, settings.skills)
+        self.skill = settings.skill
+        self.reads = ("joint_pos", "contact", *(name for name in (LIGHT, SKILL) if name in added))
 
     def variation(self, settings: BrainConfig, evolution: EvolutionConfig) -> Variation:
         """Offspring are crossed, grafted, or have one parent."""
@@ -122,7 +123,8 @@ class Brains:
         light = senses[LIGHT] if LIGHT in self.reads else jnp.zeros((links, 3))
         angles = jnp.concatenate([jnp.zeros(1), senses["joint_pos"]])
         perceived = Perceived(angles, senses["contact"], light)
-        torque, memory = thought(plan, memory, perceived, self.pause)
+        skill = senses[SKILL] if SKILL in self.reads else self.skill
+        torque, memory = thought(plan, memory, perceived, self.pause, skill)
         return torque[1:], memory
 
 

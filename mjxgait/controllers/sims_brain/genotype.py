@@ -152,11 +152,12 @@ constant frequency drives only one effector in 400."""
 
 @dataclasses.dataclass(frozen=True)
 class NerveRoom:
-    """Numbers of neurons per node, and of central neurons. steer: see `BrainConfig`."""
+    """Numbers of neurons per node, and of central neurons. steer, skills: see `BrainConfig`."""
 
     local: int = BrainConfig.local
     central: int = BrainConfig.central
     steer: bool = BrainConfig.steer
+    skills: int = BrainConfig.skills
 
     @property
     def codes(self) -> int:
@@ -169,7 +170,8 @@ class Nerves:
     """Neurons and effectors of each node.
 
     kind: [N, Q] indices into `NEURONS`. source, weight: [N, Q, 3] of their inputs.
-    effect_source, effect_weight: [N, 3] drive of each hinge to the parent.
+    effect_source, effect_weight: [N, 3] drive of each hinge to the parent. other_source,
+    other_weight: [N, 3, S - 1] the same for the other skills; None without.
 
     A source is a number: 0 for the constant 1; then the part's own sensors, its own neurons, its
     parent's, its first child's, and the central ones.
@@ -183,6 +185,17 @@ class Nerves:
     effect_source: jax.Array
     effect_weight: jax.Array
     steer: jax.Array | None = None
+    other_source: jax.Array | None = None
+    other_weight: jax.Array | None = None
+
+    @property
+    def effectors(self) -> tuple[jax.Array, jax.Array]:
+        """Sources and weights of all skills, [N, 3, S] each."""
+        source, weight = self.effect_source[..., None], self.effect_weight[..., None]
+        if self.other_source is None or self.other_weight is None:
+            return source, weight
+        sources, weights = [source, self.other_source], [weight, self.other_weight]
+        return jnp.concatenate(sources, axis=-1), jnp.concatenate(weights, axis=-1)
 
 
 @pytree
@@ -198,13 +211,17 @@ def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
     """Draw random neurons: any function, any source; weights are normal."""
     effects = {"effect_source": (nodes, 3), "effect_weight": (nodes, 3)}
     steer = {"scale": (), "steered": (nodes, 3), "steer": (nodes, 3, 2, 3)} if room.steer else {}
-    drawn = uniforms(key, _shapes((nodes, room.local)) | effects | steer)
+    others = dict.fromkeys(("other_source", "other_weight"), (nodes, 3, room.skills - 1))
+    shapes = _shapes((nodes, room.local)) | effects | steer
+    drawn = uniforms(key, shapes | (others if room.skills > 1 else {}))
     source = numbered(drawn["effect_source"], room.codes)
     return Nerves(
         **_neurons(drawn, room),
         effect_source=source,
         effect_weight=normal(drawn["effect_weight"]),
         steer=_steering(drawn) if room.steer else None,
+        other_source=numbered(drawn["other_source"], room.codes) if room.skills > 1 else None,
+        other_weight=normal(drawn["other_weight"]) if room.skills > 1 else None,
     )
 
 

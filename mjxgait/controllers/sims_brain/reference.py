@@ -93,7 +93,8 @@ class BrainReference:
     the model. step: s of the simulation. every: steps per command.
     A wire leads from a column to a neuron or a hinge. The columns: nothing, the constant 1, the
     angles of all hinges, contact and light of all parts, the values of all neurons. lit: [J, 3]
-    columns of the light that steers each hinge. steer: see `Nerves`; None without.
+    columns of the light that steers each hinge. steer: see `Nerves`; None without. skill: number of
+    the effectors that act.
     """
 
     command: ClassVar[Command] = "torque"
@@ -106,10 +107,11 @@ class BrainReference:
         hinges: Sequence[tuple[int, int]],
         step: float,
         every: int = 1,
+        skill: int = 0,
     ) -> None:
         self.genome, self.parts, self.hinges = genome, parts, tuple(hinges)
         self.every, self.pause = every, step * every
-        self.local = genome["nerves.kind"].shape[1]
+        self.local, self.skill = genome["nerves.kind"].shape[1], skill
         owned = [(p, q) for p in range(len(parts)) for q in range(self.local)]
         neurons = [*owned, *((CENTRE, q) for q in range(len(genome["centre.kind"])))]
         first = 2 + len(hinges) + 4 * len(parts)
@@ -211,9 +213,14 @@ class BrainReference:
     def _pull(self, part: int, hinge: int) -> tuple[int, float, float]:
         """Return column and weight of a hinge's drive, and its largest torque in N·m (signed)."""
         own = self.parts[part]
-        code = int(self.genome["nerves.effect_source"][own.node, hinge])
-        column, sign = self._source(part, code)
-        weight = sign * float(self.genome["nerves.effect_weight"][own.node, hinge])
+        first = self.skill == 0
+        kind, place = ("effect", ()) if first else ("other", (self.skill - 1,))
+        code, weight = (
+            self.genome[f"nerves.{kind}_{name}"][own.node, hinge, *place]
+            for name in ("source", "weight")
+        )
+        column, sign = self._source(part, int(code))
+        weight = sign * float(weight)
         return column, weight, own.strength * _sign(own, hinge)
 
     def _steer(self, flips: np.ndarray) -> np.ndarray | None:
@@ -235,4 +242,5 @@ def brain_reference(creature: Creature, champion: Champion, step: float) -> Brai
     parts = grow(champion.genome, champion.settings.parts, champion.settings.links)
     names = [name.removeprefix("part").split("_") for name in creature.joints.names]
     hinges = [(int(part), int(hinge)) for part, hinge in names]
-    return BrainReference(champion.genome, parts, hinges, step, champion.settings.every)
+    settings = champion.settings
+    return BrainReference(champion.genome, parts, hinges, step, settings.every, settings.skill)

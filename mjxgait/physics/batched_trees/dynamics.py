@@ -62,7 +62,7 @@ def bias_links(
     freedom: Motion,
     moving: jax.Array,
     qvel: jax.Array,
-    gravity: float,
+    gravity: float | jax.Array,
     pin: Pin,
 ) -> jax.Array:
     """Force [n, 6, L] that each link's motion needs without acceleration."""
@@ -165,7 +165,12 @@ def weighed(tree: Tree) -> Tree:
 
 
 def drag_links(
-    tree: Tree, poses: Sequence[Pose], body: Inertia, moving: jax.Array, drag: float, pin: Pin
+    tree: Tree,
+    poses: Sequence[Pose],
+    body: Inertia,
+    moving: jax.Array,
+    drag: float | jax.Array,
+    pin: Pin,
 ) -> jax.Array:
     """Water's force on each link, [n, 6, L] about the origin; moving: [n, 6, L].
 

@@ -24,6 +24,7 @@ from mjxgait.physics.batched_trees.dynamics import (
 from mjxgait.physics.batched_trees.tree import (
     FAR,
     Dense,
+    Medium,
     ModularSensed,
     Surroundings,
     Tree,
@@ -234,7 +235,7 @@ class TreePlant(Plant[Moment]):
     @override
     def advance(self, state: BodyState, step_data: Moment, torque: jax.Array) -> BodyState:
         after = one_kernel(self._advance)(state, step_data, torque)
-        return dataclasses.replace(after, parameters=state.parameters)
+        return dataclasses.replace(after, parameters=state.parameters, ground=state.ground)
 
     def _forward(self, state: BodyState) -> tuple[Sensed, Moment]:
         tree: Tree = state.parameters
@@ -244,10 +245,15 @@ class TreePlant(Plant[Moment]):
         freedom, turns = motions(tree, poses, pin), root_turns(poses)
         body = inertias(tree, poses, like, pin)
         moving = velocities(tree, turns, freedom, list(state.qvel), pin)
-        force = bias_links(tree, body, freedom, moving, state.qvel, around.gravity, pin)
+        medium: Medium | None = state.ground
+        gravity: float | jax.Array = around.gravity
+        drag: float | jax.Array = around.drag
+        if medium is not None:
+            gravity, drag = gravity * (1 - medium.wet), drag * medium.wet
+        force = bias_links(tree, body, freedom, moving, state.qvel, gravity, pin)
         washed = jnp.zeros_like(moving)
         if around.drag:
-            washed = drag_links(tree, poses, body, moving, around.drag, pin)
+            washed = drag_links(tree, poses, body, moving, drag, pin)
             force = force - washed
         bias = jnp.stack(generalised(tree, turns, freedom, force, pin))
         resisted = jnp.concatenate([jnp.zeros_like(bias[:6]), tree.damping[1:] * state.qvel[6:]])
@@ -256,10 +262,16 @@ class TreePlant(Plant[Moment]):
             freedom=freedom.parts,
             mass=mass_rows(tree, turns, freedom, body, pin),
             bias=pin(bias + resisted),
-            touch=pin(lowest_corners(tree, poses)) if around.floor else None,
+            touch=pin(self._touch(tree, poses, medium)) if around.floor else None,
         )
         momentum = jnp.stack([jnp.sum(x, axis=0) for x in body.times(unpack(moving)).shift])
         return self._sensed(state, poses, moving, moment.bias, momentum, washed), moment
+
+    def _touch(self, tree: Tree, poses: Sequence[Pose], medium: Medium | None) -> Touch:
+        touch = lowest_corners(tree, poses)
+        if medium is None:
+            return touch
+        return dataclasses.replace(touch, distance=jnp.where(medium.wet > 0, FAR, touch.distance))
 
     def _sensed(
         self,
@@ -274,6 +286,8 @@ class TreePlant(Plant[Moment]):
         tree: Tree = state.parameters
         centre = [c + state.qpos[i] for i, c in enumerate(centres(tree, poses))]
         weight, low = tree.mass / jnp.sum(tree.mass, axis=0), lows(tree, poses)
+        if state.ground is not None:
+            low = jnp.where(state.ground.wet > 0, FAR, low)
         own = ModularSensed(
             com=jnp.stack([jnp.sum(weight * c, axis=0) for c in centre]),
             momentum=momentum,

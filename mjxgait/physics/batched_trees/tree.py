@@ -94,9 +94,18 @@ class Tree:
         return self.mass.shape[0]
 
 
+@pytree
+class Medium:
+    """Medium of a lane, `BodyState.ground`. wet: [] 1 in water, 0 on land."""
+
+    wet: jax.Array
+
+
 @dataclasses.dataclass(frozen=True)
 class Surroundings:
     """Settings that all lanes share, constants of the program.
+
+    Where lanes have a `Medium`, floor and gravity are those of land, and the drag is that of water.
 
     step: s. friction: of the ground. contact: s, time constant of a contact (`solref`). floor:
     whether there is one, z = 0. gravity: m/s². drag: N·s/m³, the resistance of a face to its normal

@@ -1,4 +1,4 @@
-"""What bodies that grow do (Sims 1994): swim, walk, jump, follow a light."""
+"""What bodies that grow do (Sims 1994): swim, walk, jump, follow a light; or each on command."""
 
 from functools import partial
 
@@ -43,5 +43,23 @@ KINDS = (
         criteria="follow_criteria:on_land",
         tables=("roam", "follow"),
         what="follow a light on land; for bodies that grow",
+    ),
+    _kind(
+        "amphibian",
+        task="skills:Amphibian",
+        criteria="skills_criteria:Amphibian",
+        water=True,
+        tables=("swim", "roam"),
+        skills=("swim", "roam"),
+        what="swim and walk, on command; for bodies that grow",
+    ),
+    _kind(
+        "all-trades",
+        task="skills:AllTrades",
+        criteria="skills_criteria:AllTrades",
+        water=True,
+        tables=("swim", "roam", "jump", "follow"),
+        skills=("swim", "roam", "jump", "follow"),
+        what="swim, walk, jump and follow a light, on command; for bodies that grow",
     ),
 )

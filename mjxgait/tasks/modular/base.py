@@ -86,7 +86,7 @@ class ModularTask(PlainTask):
             damping=usual,
         )
 
-    def params(self, settings: ModularConfig) -> jax.Array:
+    def params(self, settings: Any) -> Any:
         """The first step [] that counts."""
         return jnp.round(settings.settle / self.step).astype(jnp.int32)
 

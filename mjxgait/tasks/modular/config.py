@@ -3,6 +3,8 @@
 import dataclasses
 from typing import Annotated
 
+import pydantic
+
 from mjxgait.config.tables import ADDED, STRICT, NonNegative, Positive
 
 
@@ -120,3 +122,54 @@ class JumpConfig(ModularConfig):
     __pydantic_config__ = STRICT
     overlap: Positive = 0.035
     weights: JumpWeights = dataclasses.field(default_factory=JumpWeights)
+
+
+def _at_once() -> RoamConfig:
+    return RoamConfig(apart=0.0, weights=RoamWeights(vibration=1.0))
+
+
+def _after_turning() -> SwimConfig:
+    return SwimConfig(settle=4.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class RequiredScores:
+    """What the certificate requires of each skill.
+
+    Attributes:
+      swim: m/s.
+      roam: m/s.
+      jump: m.
+      follow: m/s, towards the light.
+    """
+
+    __pydantic_config__ = STRICT
+    swim: Positive = 0.2
+    roam: Positive = 0.2
+    jump: Positive = 0.1
+    follow: Positive = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class SkillsConfig:
+    """Parameters of tasks with several skills; `apart` does nothing in them.
+
+    Attributes:
+      required: unit of each skill's performance.
+      least: performance that scores 0, in these units; 1 unit scores 1, and between and beyond the
+        score grows with the logarithm.
+      most: performance beyond which the score stays the same.
+      swim: parameters of that skill, as of its own task.
+      roam: likewise.
+      jump: likewise.
+      follow: likewise.
+    """
+
+    __pydantic_config__ = STRICT
+    required: RequiredScores = dataclasses.field(default_factory=RequiredScores)
+    least: Annotated[float, pydantic.Field(gt=0, lt=1)] = 0.02
+    most: Positive = 1.5
+    swim: SwimConfig = dataclasses.field(default_factory=SwimConfig)
+    roam: RoamConfig = dataclasses.field(default_factory=_at_once)
+    jump: JumpConfig = dataclasses.field(default_factory=JumpConfig)
+    follow: SwimConfig = dataclasses.field(default_factory=_after_turning)

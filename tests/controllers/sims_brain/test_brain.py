@@ -26,7 +26,7 @@ from mjxgait.rendering.brain import READS, draw_brain, kind_of, network_of, shap
 from mjxgait.rendering.curves import figure
 from mjxgait.training.experiment import arrays_of
 
-CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(steer=True), 200, 0.01
+CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(steer=True, skills=3), 200, 0.01
 KIN = Kin(CAPACITY, ROOM, Ranges())
 FIRED = jax.jit(fired, static_argnums=3)
 
@@ -63,11 +63,13 @@ def test_a_brain_matches_its_reference_controller():
         return genotype, body, wired(genotype.nerves, genotype.centre, body, ROOM)
 
     genotypes, bodies, brains = jax.jit(jax.vmap(make))(jax.random.split(key_of(3), COUNT))
-    think = jax.jit(jax.vmap(lambda b, m, p: thought(b, m, p, STEP)))
+    skills = np.arange(COUNT) % ROOM.skills
+    think = jax.jit(jax.vmap(lambda b, m, p, s: thought(b, m, p, STEP, s)))
     neurons = CAPACITY.parts * ROOM.local + ROOM.central
     minds = jax.vmap(lambda _: blank(neurons))(jnp.arange(COUNT))
     links, references = zip(
-        *(reference(one(genotypes, i), one(bodies, i)) for i in range(COUNT)), strict=True
+        *(reference(one(genotypes, i), one(bodies, i), skills[i]) for i in range(COUNT)),
+        strict=True,
     )
     memories = [t.init(1) for t in references]
     rng, wrong, driven = np.random.default_rng(4), np.zeros(COUNT), 0
@@ -75,7 +77,7 @@ def test_a_brain_matches_its_reference_controller():
         angles = np.float32(rng.uniform(-1, 1, (COUNT, CAPACITY.links)))
         contact = np.float32(rng.integers(0, 2, (COUNT, CAPACITY.links)))
         light = np.float32(rng.normal(size=(COUNT, CAPACITY.links, 3)))
-        torque, minds = think(brains, minds, Perceived(angles, contact, light))
+        torque, minds = think(brains, minds, Perceived(angles, contact, light), skills)
         for i in np.flatnonzero([len(found) > 0 for found in links]):
             last = one(bodies, i).parts.last[: len(references[i].parts)]
             senses = {
@@ -107,17 +109,27 @@ def some() -> Genotype:
     return jax.vmap(KIN.create)(jax.random.split(key_of(11), 30))
 
 
-def brain_of(genotype: Genotype) -> BrainReference:
+def test_each_skill_has_effectors_of_its_own():
+    """Each drives the hinges in its own way; the neurons are the same."""
+    moving = [found for found in (one(some(), i) for i in range(30)) if brain_of(found).hinges]
+    each = [[pulled(brain_of(found, skill), True) for skill in range(3)] for found in moving]
+    apart = [(a != b).any() and (b != c).any() for a, b, c in each]
+    assert np.mean(apart) > 0.8
+    first, second = (brain_of(moving[0], skill) for skill in (0, 1))
+    np.testing.assert_array_equal(first.column, second.column)
+
+
+def brain_of(genotype: Genotype, skill: int = 0) -> BrainReference:
     """The reference brain for the body of a genotype, without the arrays."""
     genome = arrays_of(genotype)
     parts = grow(genome, CAPACITY.parts, CAPACITY.links)
     hinges = [(p, h) for p, part in enumerate(parts) for h in range(len(part.hinges))]
-    return BrainReference(genome, parts, hinges, STEP)
+    return BrainReference(genome, parts, hinges, STEP, skill=skill)
 
 
-def reference(genotype: Genotype, body: Body) -> tuple[list[int], BrainReference]:
+def reference(genotype: Genotype, body: Body, skill: int) -> tuple[list[int], BrainReference]:
     """The links of all hinges, part by part, and the brain that drives them."""
-    plain = brain_of(genotype)
+    plain = brain_of(genotype, skill)
     links = [
         int(np.flatnonzero((body.part == p) & (body.hinge == h) & (body.tree.moves > 0))[0])
         for p, h in plain.hinges

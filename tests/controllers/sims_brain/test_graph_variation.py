@@ -25,7 +25,7 @@ from mjxgait.controllers.sims_brain.operators import (
 from mjxgait.controllers.sims_brain.reference_body import JOINTS, NEURONS
 from mjxgait.evolution.chance import key_of
 
-CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(steer=True), Ranges(), 2000
+CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(steer=True, skills=3), Ranges(), 2000
 KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))
 BUSY = ("mutate", "cross", "graft")
 ALIVE = jax.jit(jax.vmap(reachable))
@@ -242,8 +242,10 @@ def test_only_what_may_evolve_differs_from_the_mother(
     parents: tuple[Genotype, Genotype], evolves: Literal["all", "brain", "steering"]
 ):
     """Under any operator."""
-    controller = Brains(0.01, BrainConfig(steer=True))
-    bred = controller.variation(BrainConfig(steer=True, evolves=evolves), EvolutionConfig())
+    controller = Brains(0.01, BrainConfig(steer=True, skills=3))
+    bred = controller.variation(
+        BrainConfig(steer=True, skills=3, evolves=evolves), EvolutionConfig()
+    )
     keys = jax.random.split(key_of(3), 200)
     few = [jax.tree.map(lambda leaf: leaf[:200], parent) for parent in parents]
 
