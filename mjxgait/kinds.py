@@ -149,6 +149,12 @@ def skills_of(task: str) -> tuple[str, ...]:
     return kind.skills if kind else ()
 
 
+def title_of(task: str) -> str:
+    """Return the user's name for a task."""
+    kind = known_task(task)
+    return (kind.called or kind.name) if kind else task
+
+
 def meant_of_grown(task: str) -> str:
     """Return the task that a name means for a body that grows."""
     called = {kind.called: kind.name for kind in tasks().values() if kind.called}

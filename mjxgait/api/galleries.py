@@ -9,6 +9,7 @@ from mjxgait.api.run import Place, Run
 from mjxgait.api.studies import STUDY, champions_of_study
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, require_ending
+from mjxgait.kinds import title_of
 from mjxgait.training.folder import CHAMPION, CONFIG, require_output
 
 if TYPE_CHECKING:
@@ -145,7 +146,7 @@ def _names(runs: Sequence[Path]) -> list[str]:
 
 
 def _title(shown: "Sequence[Entry]") -> str:
-    tasks = dict.fromkeys(one.walk.champion.task for one in shown)
+    tasks = dict.fromkeys(title_of(one.walk.champion.task) for one in shown)
     creatures = dict.fromkeys(one.walk.creature.title for one in shown)
     return f"{', '.join(creatures)}: {', '.join(tasks)}"
 

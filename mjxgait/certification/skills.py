@@ -13,8 +13,9 @@ from mjxgait.certification.advice import ADVICE
 from mjxgait.certification.certificate import Certificate, NominalCheck
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
-from mjxgait.champion import Champion, by_skill, shown
+from mjxgait.champion import Champion, by_skill
 from mjxgait.creature import Creature
+from mjxgait.kinds import title_of
 
 SHARED = ("parts", "mass", "ground")
 """Entries of a report that are those of the body, the same in all skills."""
@@ -105,7 +106,7 @@ def _skills(creature: Creature, champion: Champion) -> Iterator[tuple[str, Creat
 def _named(each: Sequence[tuple[str, Sequence[Criterion]]]) -> tuple[Criterion, ...]:
     """Return the criteria of all skills, with the skill in their names."""
     return tuple(
-        dataclasses.replace(criterion, name=f"{shown(task)}: {criterion.name}")
+        dataclasses.replace(criterion, name=f"{title_of(task)}: {criterion.name}")
         for task, criteria in each
         for criterion in criteria
     )
@@ -115,8 +116,8 @@ def _report(each: Sequence[tuple[str, Certificate]]) -> dict[str, Any]:
     """Return the report: the body's entries, and each skill's own report by task."""
     first = each[0][1].report
     found: dict[str, Any] = {key: first[key] for key in SHARED if key in first}
-    found["summary"] = "; ".join(f"{shown(t)}: {one.report['summary']}" for t, one in each)
-    advice = [f"{shown(t)}: {said}" for t, one in each for said in one.report.get(ADVICE, [])]
+    found["summary"] = "; ".join(f"{title_of(t)}: {one.report['summary']}" for t, one in each)
+    advice = [f"{title_of(t)}: {said}" for t, one in each for said in one.report.get(ADVICE, [])]
     if advice:
         found[ADVICE] = advice
     return found | {"skills": {task: one.report for task, one in each}}

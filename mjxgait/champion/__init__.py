@@ -8,7 +8,7 @@ from mjxgait.champion.record import (
     write_champion,
 )
 from mjxgait.champion.serializers import Serializer, serializer_of
-from mjxgait.champion.skills import SKILLS, by_skill, shown
+from mjxgait.champion.skills import SKILLS, by_skill
 
 __all__ = [
     "SKILLS",
@@ -18,7 +18,6 @@ __all__ = [
     "by_skill",
     "read_champion",
     "serializer_of",
-    "shown",
     "split_genome",
     "write_champion",
 ]

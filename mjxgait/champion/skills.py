@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from mjxgait.champion.record import Champion
-from mjxgait.kinds import known_task, skills_of
+from mjxgait.kinds import skills_of
 
 SKILLS = "skills"
 """Key of a champion's origin: metrics of the undisturbed trial of each skill, by task."""
@@ -16,12 +16,6 @@ def by_skill(champion: Champion) -> dict[str, Champion]:
     return {
         task: _doing(champion, task, number) for number, task in enumerate(skills_of(champion.task))
     }
-
-
-def shown(task: str) -> str:
-    """Return the name of a task for the user."""
-    kind = known_task(task)
-    return (kind.called or kind.name) if kind else task
 
 
 def _doing(champion: Champion, task: str, number: int) -> Champion:

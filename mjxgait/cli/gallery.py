@@ -10,7 +10,7 @@ import tyro
 from mjxgait.cli.options import Verbosity, parsed
 from mjxgait.errors import UserError
 from mjxgait.experiments.multi_seed import folders_of, is_multi_seed
-from mjxgait.kinds import tasks
+from mjxgait.kinds import tasks, title_of
 from mjxgait.training.folder import open_run
 
 PAGE = "gallery.html"
@@ -126,8 +126,7 @@ def _check_same(options: GalleryOptions, study: Path) -> None:
     """
     folders = folders_of(study)
     creature, config = open_run(folders[0])
-    kind = tasks().get(config.use.task)
-    task = kind.called or kind.name if kind else config.use.task
+    task = title_of(config.use.task)
     has = {
         "task": task,
         "runs": len(folders),
@@ -147,5 +146,5 @@ def _check_same(options: GalleryOptions, study: Path) -> None:
 
 def _usual_creature(task: str) -> str:
     """The creature that has this task: one that grows, if any of that kind has it."""
-    grown = {kind.called or name for name, kind in tasks().items() if kind.modular}
+    grown = {title_of(name) for name, kind in tasks().items() if kind.modular}
     return BLOCKS if task in grown else WALKER

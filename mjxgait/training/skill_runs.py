@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from mjxgait.certification import Certificate
-from mjxgait.champion import Champion, by_skill, shown, write_champion
+from mjxgait.champion import Champion, by_skill, write_champion
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.files import write_text
-from mjxgait.kinds import skills_of
+from mjxgait.kinds import skills_of, title_of
 from mjxgait.tasks.walk.targets import WalkTargets, configured
 from mjxgait.training.folder import (
     BODY,
@@ -36,7 +36,7 @@ def write_skill_runs(
     if place.exists():
         shutil.rmtree(place)
     for task, one in by_skill(champion).items():
-        own = create_run(place / shown(task), creature, _config(folder, creature, task))
+        own = create_run(place / title_of(task), creature, _config(folder, creature, task))
         body = one.embodied(creature)
         write_champion(one, creature, own / CHAMPION)
         write_creature(own / BODY, body.files)
