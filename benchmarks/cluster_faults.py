@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
 from simulated import machines, workers
 
 from mjxgait.processes import python_command
-from mjxgait.training.folder import read_metrics
+from mjxgait.training.logs import read_metrics
 
 STOOL = Path(__file__).parents[1] / "tests" / "data" / "stool"
 STUDY = f"""question = "Who is killed?"

@@ -26,13 +26,8 @@ from mjxgait.certification import (
     verdict_of,
 )
 from mjxgait.processes import python_command
-from mjxgait.training.folder import (
-    CERTIFICATE,
-    METRICS,
-    open_champion,
-    open_run,
-    read_metrics,
-)
+from mjxgait.training.folder import CERTIFICATE, METRICS, open_champion, open_run
+from mjxgait.training.logs import read_metrics
 
 HEADER = (
     "creature",

@@ -25,7 +25,8 @@ from importer.packages import MODELS, model_file
 
 from mjxgait.certification import verdict_of
 from mjxgait.processes import python_command
-from mjxgait.training.folder import CERTIFICATE, METRICS, read_metrics
+from mjxgait.training.folder import CERTIFICATE, METRICS
+from mjxgait.training.logs import read_metrics
 
 HEADER = (
     "model",

@@ -47,7 +47,8 @@ from mjxgait.evolution.chance import key_of
 from mjxgait.files import write_text
 from mjxgait.simulation.rollout import choose
 from mjxgait.training.advance import versions
-from mjxgait.training.folder import CERTIFICATE, CHAMPION, append_lines, create_run
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, create_run
+from mjxgait.training.logs import append_lines
 from mjxgait.training.stages import compiler_options, prepare_devices
 
 COLUMNS = (

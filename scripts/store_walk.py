@@ -23,13 +23,7 @@ import numpy as np
 
 from mjxgait.certification import CertificateConfig, certify, record
 from mjxgait.reference.measure import Recording
-from mjxgait.training.folder import (
-    CERTIFICATE,
-    CHAMPION,
-    CONFIG,
-    CREATURE,
-    open_champion,
-)
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, CONFIG, CREATURE, open_champion
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, FOLDER = ROOT / "docs" / "research" / "worked-example.md", ROOT / "docs" / "data" / "walk"

@@ -17,7 +17,8 @@ from mjxgait.creature import load_creature as load_folder
 from mjxgait.creature.scale import at_step, facing, load_files, scaled
 from mjxgait.errors import UserError
 from mjxgait.files import path_of
-from mjxgait.training.folder import Line, check_run, create_run
+from mjxgait.training.folder import check_run, create_run
+from mjxgait.training.logs import Line
 
 if TYPE_CHECKING:
     from mjxgait.training.screen import Screen

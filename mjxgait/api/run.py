@@ -16,16 +16,8 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.extras import install_command
 from mjxgait.files import path_of
-from mjxgait.training.folder import (
-    CERTIFICATE,
-    CHAMPION,
-    METRICS,
-    MOTHERS,
-    columns,
-    open_champion,
-    open_run,
-    read_metrics,
-)
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, METRICS, open_champion, open_run
+from mjxgait.training.logs import MOTHERS, columns, read_metrics
 
 if TYPE_CHECKING:  # all drawing code; an extra
     import pandas

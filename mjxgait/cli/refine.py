@@ -16,12 +16,7 @@ from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import read_toml
 from mjxgait.creature import Creature
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.training.folder import (
-    check_parts,
-    check_run,
-    new_run_folder,
-    open_run,
-)
+from mjxgait.training.folder import check_parts, check_run, new_run_folder, open_run
 
 
 @dataclasses.dataclass(frozen=True)

@@ -35,15 +35,8 @@ from mjxgait.tasks.walk.targets import (
     hint,
 )
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import (
-    METRICS,
-    PLOT,
-    PLOTS,
-    command,
-    create_run,
-    open_run,
-    read_metrics,
-)
+from mjxgait.training.folder import METRICS, PLOT, PLOTS, command, create_run, open_run
+from mjxgait.training.logs import read_metrics
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.training.screen import Screen

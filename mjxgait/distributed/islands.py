@@ -25,17 +25,9 @@ from mjxgait.training.disk import disk_errors
 from mjxgait.training.examination import Examined, Examiner, why_ended
 from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Experiment, build_experiment
-from mjxgait.training.folder import (
-    EXAMS,
-    ISLANDS,
-    METRICS,
-    MIGRATIONS,
-    MOTHERS,
-    Line,
-    append_lines,
-    truncate_metrics,
-)
+from mjxgait.training.folder import EXAMS, ISLANDS, METRICS, MIGRATIONS
 from mjxgait.training.lock import locked_run
+from mjxgait.training.logs import MOTHERS, Line, append_lines, truncate_metrics
 from mjxgait.training.loop import conclude, interruptible, keep_best, report
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen

@@ -26,7 +26,7 @@ from mjxgait.tasks.starts import Starts
 from mjxgait.training.advance import Generations, versions
 from mjxgait.training.checkpoint import Packed, pack
 from mjxgait.training.experiment import Batch, ProgramKey, Step, build_batch, one_row, program_key
-from mjxgait.training.folder import Line
+from mjxgait.training.logs import Line
 from mjxgait.training.simulator import SimulatorSpec
 from mjxgait.training.spec import make_spec
 from mjxgait.training.stages import CompiledGeneration, Turn, at_once, compiled

@@ -15,7 +15,8 @@ from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.errors import UserError
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.checkpoint import Checkpoints, Packed, side_by_side
-from mjxgait.training.folder import METRICS, append_lines, open_run, truncate_metrics
+from mjxgait.training.folder import METRICS, open_run
+from mjxgait.training.logs import append_lines, truncate_metrics
 from mjxgait.types import Evaluation, RequestedTrials
 
 RowsProgress = Callable[[int, int, Advanced | None], object]

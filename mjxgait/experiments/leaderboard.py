@@ -11,16 +11,8 @@ from mjxgait.config.tables import STORED, Flag, Index, Number, Text
 from mjxgait.errors import UserError
 from mjxgait.experiments.ablation.findings import share
 from mjxgait.files import writing
-from mjxgait.training.folder import (
-    CERTIFICATE,
-    METRICS,
-    command,
-    open_champion,
-    open_run,
-    read_metrics,
-    read_records,
-    write_lines,
-)
+from mjxgait.training.folder import CERTIFICATE, METRICS, command, open_champion, open_run
+from mjxgait.training.logs import read_metrics, read_records, write_lines
 
 HEADINGS = (
     *("creature", "task", "algorithm", "machine"),

@@ -10,13 +10,8 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.files import write_text
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import (
-    Line,
-    check_free,
-    check_parts,
-    create_run,
-    new_run_folder,
-)
+from mjxgait.training.folder import check_free, check_parts, create_run, new_run_folder
+from mjxgait.training.logs import Line
 
 SEEDS_FILE = "zoo.toml"
 

@@ -30,8 +30,9 @@ from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.plugins import make_task, resolve_config
 from mjxgait.plugins.registry import what_ends
 from mjxgait.tasks.base import Task
-from mjxgait.training.folder import CERTIFICATE, STRESS, Line, kept_champion
+from mjxgait.training.folder import CERTIFICATE, STRESS, kept_champion
 from mjxgait.training.lock import running
+from mjxgait.training.logs import Line
 
 KINDS = {
     Origin.INITIAL: "initial",

@@ -15,7 +15,8 @@ from typing_extensions import override
 from mjxgait.config.tables import STORED, Index, Number
 from mjxgait.inspect.snapshot import Snapshot, shared
 from mjxgait.kinds import known_controller
-from mjxgait.training.folder import ISLANDS, METRICS, MIGRATIONS, Line, read_metrics, read_records
+from mjxgait.training.folder import ISLANDS, METRICS, MIGRATIONS
+from mjxgait.training.logs import Line, read_metrics, read_records
 from mjxgait.training.stored import is_number
 
 Facts = Mapping[str, Any]

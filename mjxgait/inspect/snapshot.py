@@ -16,15 +16,8 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.files import read_json
 from mjxgait.training.ended import end_of
-from mjxgait.training.folder import (
-    CHAMPION,
-    CONFIG,
-    METRICS,
-    Line,
-    kept_champion,
-    open_run,
-    read_metrics,
-)
+from mjxgait.training.folder import CHAMPION, CONFIG, METRICS, kept_champion, open_run
+from mjxgait.training.logs import Line, read_metrics
 from mjxgait.training.stored import (
     FOLDER,
     Manifest,

@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from mjxgait.certification.stress import Stress
 from mjxgait.files import replaced
-from mjxgait.training.folder import Line, columns
+from mjxgait.training.logs import Line, columns
 
 matplotlib.use("Agg")
 

@@ -21,7 +21,7 @@ from mjxgait.rendering.curves import ACCENT, DARK, MIDDLE, PALE
 from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.video import Runner, in_generations
 from mjxgait.rendering.walk import Walk
-from mjxgait.training.folder import mothers_line
+from mjxgait.training.logs import mothers_line
 
 LEAF, LEVEL = 0.52, 0.5
 """Width of a leaf and height of a level in inches."""

@@ -22,15 +22,9 @@ from mjxgait.rendering.gaitplots import gait_figures
 from mjxgait.rendering.video import LOOP_SECONDS, champion_of
 from mjxgait.rendering.walk import Walk
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import (
-    CHAMPION,
-    METRICS,
-    PLOTS,
-    command,
-    open_run,
-    read_metrics,
-)
+from mjxgait.training.folder import CHAMPION, METRICS, PLOTS, command, open_run
 from mjxgait.training.lock import why_empty
+from mjxgait.training.logs import read_metrics
 
 
 def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMATS) -> list[Path]:

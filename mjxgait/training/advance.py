@@ -13,7 +13,7 @@ import numpy as np
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.tasks.base import Task
 from mjxgait.training.experiment import Batch, Step, row_of
-from mjxgait.training.folder import MOTHERS, Line
+from mjxgait.training.logs import MOTHERS, Line
 
 
 class Generations:

@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 
 from mjxgait.config.tables import STORED, Flag, Index, Text
-from mjxgait.training.folder import Line, read_records, write_lines
+from mjxgait.training.logs import Line, read_records, write_lines
 
 
 @dataclasses.dataclass(frozen=True)

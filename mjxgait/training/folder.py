@@ -3,28 +3,18 @@
 A folder may come from anywhere, so its entries are only printed; the user decides to pass them on.
 """
 
-import dataclasses
 import importlib.metadata
-import json
 import re
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
 
-import numpy as np
-import pydantic
 import tomli_w
 
 from mjxgait.certification.check_body import check_body
 from mjxgait.champion import Champion, DamagedChampion, read_champion
 from mjxgait.config.schema import Config, UseConfig
 from mjxgait.config.tables import (
-    STORED,
-    Flag,
-    Index,
-    Number,
-    check,
     check_whole,
     dump_toml,
     read_toml,
@@ -32,12 +22,11 @@ from mjxgait.config.tables import (
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.proportions import extreme_bodies
 from mjxgait.errors import NotLoaded, UserError
-from mjxgait.evolution.state import NO_MOTHER
-from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, read_text, write_text, writing
+from mjxgait.files import read_text, write_text, writing
 from mjxgait.plugins import build_config
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.user_code import KINDS, places_of
-from mjxgait.training.disk import disk_errors, require_writable
+from mjxgait.training.disk import require_writable
 
 CONFIG, OWN = "config.toml", "own.toml"
 """Files in a run folder: settings; and FILE.py:CLASS of a user-defined controller or task."""
@@ -123,8 +112,6 @@ def _of_version(error: UserError, folder: Path) -> UserError:
 CREATURE, METRICS, CHAMPION = "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
 PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
-MOTHERS = "mothers"
-"""Key in a log line: each individual's own place in the previous generation, or its mother's."""
 ISLANDS, MIGRATIONS, ANCESTORS = "islands", "migrations.jsonl", "ancestors"
 
 
@@ -141,30 +128,6 @@ def require_output(path: Path) -> None:
     if path.name in RUN_FILES and (path.absolute().parent / CONFIG).is_file():
         raise UserError(f"{path}: the run's own file; name another one")
     require_writable(path)
-
-
-@dataclasses.dataclass(frozen=True)
-class Numbered:
-    """Schema of a line in files that a resumed run truncates."""
-
-    __pydantic_config__ = STORED
-    generation: Annotated[int, pydantic.Field(strict=True)]
-
-
-Line = dict[str, Any]
-"""A JSON object by name: a line of an append-only file."""
-
-
-@dataclasses.dataclass(frozen=True)
-class _Metrics:
-    """Schema of a line of `metrics.jsonl`; all further fields are numbers."""
-
-    __pydantic_config__ = STORED
-    generation: Index
-    best: Number | None
-    mean: Number | None
-    forced: Flag
-    mothers: list[int] = dataclasses.field(default_factory=list)
 
 
 def check_run(folder: Path | None, creature: Creature, config: Config) -> Path:
@@ -309,73 +272,3 @@ def kept_champion(folder: Path, creature: Creature) -> Champion:
     except DamagedChampion as error:
         again = command("train", "--resume", folder, run=folder)
         raise UserError(f"{error}; write it anew with: {again}") from None
-
-
-def read_metrics(path: Path) -> list[Line]:
-    """Return the lines of a `metrics.jsonl`, without a last line that a kill cut off.
-
-    Raises:
-      UserError: it is damaged; names the line.
-    """
-    lines = read_records(path, _Metrics)
-    for number, line in enumerate(lines, 1):
-        for name, value in line.items():
-            if not isinstance(value, int | float | None) and name not in (MOTHERS, "variant"):
-                raise DamagedFile(f"{path}, line {number}: {name} is not a number; {TAKE_OUT}")
-    return lines
-
-
-def columns(lines: Sequence[Line]) -> dict[str, np.ndarray]:
-    """Return each metric but `mothers` over the generations [G], NaN where it is missing."""
-    names = dict.fromkeys(name for line in lines for name in line if name != MOTHERS)
-    return {
-        name: np.array([np.nan if line.get(name) is None else line[name] for line in lines])
-        for name in names
-    }
-
-
-def read_records(path: Path, schema: type) -> list[Line]:
-    """Return the lines of an append-only file, checked by schema; see `files.read_lines`."""
-    lines = read_lines(path)
-    for number, line in enumerate(lines, 1):
-        check(schema, line, f"{path}, line {number}", TAKE_OUT)
-    return lines
-
-
-def truncate_metrics(path: Path, generation: int) -> None:
-    """Remove the lines after a generation, because a resumed run writes them again."""
-    kept = [line for line in read_records(path, Numbered) if line["generation"] <= generation]
-    write_lines(path, kept)
-
-
-def append_lines(path: Path, lines: Iterable[Mapping[str, object]]) -> None:
-    """Append JSON objects to a log, one per line.
-
-    Logs are written before the checkpoint that they lead to: a kill in between leaves surplus
-    lines, which a resumed run removes (`truncate_metrics`), and never a gap.
-    """
-    with disk_errors(path.parent), path.open("a", encoding="utf-8") as log:
-        log.writelines(json.dumps(line) + "\n" for line in lines)
-
-
-def write_lines(path: Path, lines: Iterable[Mapping[str, object]]) -> None:
-    """Write a file at once, with one JSON object per line."""
-    write_text(path, "".join(json.dumps(line) + "\n" for line in lines))
-
-
-def mothers_line(lines: Sequence[Mapping[str, Any]], generation: int, place: int) -> dict[int, int]:
-    """Return the places of an individual's maternal ancestors by generation, latest first.
-
-    The line ends at an individual without a mother or a generation without a log line.
-    """
-    known = {line["generation"]: line[MOTHERS] for line in lines if MOTHERS in line}
-    found = {generation: place}
-    while (mother := _mother(known.get(generation, ()), place)) != NO_MOTHER:
-        generation, place = generation - 1, mother
-        found[generation] = place
-    return found
-
-
-def _mother(places: Sequence[int], place: int) -> int:
-    """Return the place of an individual's mother; `NO_MOTHER` if the log does not have it."""
-    return places[place] if 0 <= place < len(places) else NO_MOTHER

@@ -31,11 +31,8 @@ from mjxgait.training.folder import (
     EXAMS,
     METRICS,
     STRESS,
-    append_lines,
     command,
     kept_champion,
-    read_metrics,
-    truncate_metrics,
     write_creature,
 )
 from mjxgait.training.initial import (
@@ -48,6 +45,7 @@ from mjxgait.training.initial import (
     read_initial,
 )
 from mjxgait.training.lock import locked_run
+from mjxgait.training.logs import append_lines, read_metrics, truncate_metrics
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.skill_runs import write_skill_runs

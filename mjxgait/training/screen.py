@@ -18,15 +18,8 @@ from mjxgait.config.schema import Config
 from mjxgait.creature.ground.spec import FLAT
 from mjxgait.output import LOG, Output, duration
 from mjxgait.tasks.walk.target_criteria import in_the_way
-from mjxgait.training.folder import (
-    CHAMPION,
-    CONFIG,
-    CREATURE,
-    METRICS,
-    PLOT,
-    Line,
-    command,
-)
+from mjxgait.training.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT, command
+from mjxgait.training.logs import Line
 
 
 class Screen(Output):

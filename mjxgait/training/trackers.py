@@ -14,7 +14,8 @@ from mjxgait.config.tables import read_toml
 from mjxgait.errors import UserError
 from mjxgait.extras import install_command
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import CONFIG, METRICS, Line, read_metrics
+from mjxgait.training.folder import CONFIG, METRICS
+from mjxgait.training.logs import Line, read_metrics
 from mjxgait.training.screen import Screen
 
 GROUPS = {"term_": "term/", "outcome_": "outcome/"}

@@ -24,13 +24,8 @@ import numpy as np
 from mjxgait.animation.export import build_glb, walk_loop, walk_take
 from mjxgait.errors import UserError
 from mjxgait.rendering.walk import record_walk
-from mjxgait.training.folder import (
-    CHAMPION,
-    METRICS,
-    open_champion,
-    open_run,
-    read_metrics,
-)
+from mjxgait.training.folder import CHAMPION, METRICS, open_champion, open_run
+from mjxgait.training.logs import read_metrics
 from mjxgait.web.templates import asset, viewer_script
 
 HERE = "127.0.0.1"

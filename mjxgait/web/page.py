@@ -15,7 +15,8 @@ from mjxgait.rendering.curves import Figures, draw_fitness, figure
 from mjxgait.rendering.gaitplots import gait_figures
 from mjxgait.rendering.video import LOOP_SECONDS
 from mjxgait.rendering.walk import Walk, doubt, record_walk
-from mjxgait.training.folder import METRICS, open_champion, read_metrics
+from mjxgait.training.folder import METRICS, open_champion
+from mjxgait.training.logs import read_metrics
 from mjxgait.web.certificate import certificate_summary, certificate_table, table
 from mjxgait.web.templates import embedded, style, template, viewer_script
 

@@ -20,7 +20,8 @@ from mjxgait.distributed.jobs import Programs
 from mjxgait.distributed.scheduler import LocalBackend, Scheduler
 from mjxgait.inspect.sections import island_facts
 from mjxgait.training import stages
-from mjxgait.training.folder import Numbered, create_run, read_metrics, read_records
+from mjxgait.training.folder import create_run
+from mjxgait.training.logs import Numbered, read_metrics, read_records
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import stored_generations
 

@@ -25,7 +25,7 @@ from mjxgait.experiments.ablation.plan import (
     make_plan,
 )
 from mjxgait.experiments.ablation.rows import run_study
-from mjxgait.training.folder import read_metrics
+from mjxgait.training.logs import read_metrics
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("ray") is None, reason='needs Ray: pip install "mjxgait[cluster]"'

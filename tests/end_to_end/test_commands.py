@@ -17,7 +17,8 @@ from mjxgait.certification import read_certificate
 from mjxgait.cli import COMMANDS
 from mjxgait.creature import load_creature
 from mjxgait.experiments.leaderboard import entry_of
-from mjxgait.training.folder import CERTIFICATE, METRICS, open_run, read_metrics
+from mjxgait.training.folder import CERTIFICATE, METRICS, open_run
+from mjxgait.training.logs import read_metrics
 
 ELSEWHERE = {
     "completion": "tests/end_to_end/test_commands.py::test_completion_knows_commands_and_options",

@@ -29,8 +29,9 @@ from mjxgait.output import Output
 from mjxgait.plugins import resolve_config
 from mjxgait.training import stages
 from mjxgait.training.experiment import arrays_of, build_experiment
-from mjxgait.training.folder import ANCESTORS, METRICS, create_run, open_run, read_metrics
+from mjxgait.training.folder import ANCESTORS, METRICS, create_run, open_run
 from mjxgait.training.initial import INITIAL, initial_of, planted, read_initial, united
+from mjxgait.training.logs import read_metrics
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import read_stored
 

@@ -21,13 +21,8 @@ from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.experiments.multi_seed import create_multi_seed, folders_of, read_seeds
 from mjxgait.experiments.repertoire.grid import POSES
 from mjxgait.experiments.seeds_compared import found_in
-from mjxgait.training.folder import (
-    CERTIFICATE,
-    CHAMPION,
-    METRICS,
-    open_run,
-    read_metrics,
-)
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, METRICS, open_run
+from mjxgait.training.logs import read_metrics
 from mjxgait.training.stored import read_stored, stored_generations
 
 SEEDS = (5, 6, 7)

@@ -10,12 +10,7 @@ from inspection.made_up import LAST
 
 from mjxgait.inspect import read_snapshot
 from mjxgait.training.ended import nothing_left
-from mjxgait.training.folder import (
-    CERTIFICATE,
-    CHAMPION,
-    kept_champion,
-    open_run,
-)
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, kept_champion, open_run
 
 ALL = f"all {LAST} generations are done"
 

@@ -1,6 +1,6 @@
 """Ancestors, read from the log of a run."""
 
-from mjxgait.training.folder import MOTHERS, mothers_line
+from mjxgait.training.logs import MOTHERS, mothers_line
 
 LOG = [
     {"generation": 0, MOTHERS: [-1, -1, -1]},

@@ -14,7 +14,8 @@ from mjxgait.rendering.filmstrip import filmstrip
 from mjxgait.rendering.gaitplots import gait_window
 from mjxgait.rendering.plots import plot_run
 from mjxgait.rendering.walk import record_walk
-from mjxgait.training.folder import METRICS, columns
+from mjxgait.training.folder import METRICS
+from mjxgait.training.logs import columns
 
 PROGRESS = {"fitness", "terms", "diversity"}
 GAIT = {"footfalls", "joints", "trunk", "filmstrip"}

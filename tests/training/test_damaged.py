@@ -26,15 +26,8 @@ from mjxgait.errors import UserError
 from mjxgait.inspect.sections import island_facts
 from mjxgait.rendering.walk import record_walk
 from mjxgait.training.exams import Exams
-from mjxgait.training.folder import (
-    CERTIFICATE,
-    CHAMPION,
-    CONFIG,
-    METRICS,
-    columns,
-    open_run,
-    read_metrics,
-)
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run
+from mjxgait.training.logs import columns, read_metrics
 from mjxgait.training.stored import FOLDER, stored_generations
 from mjxgait.web.certificate import certificate_table
 from mjxgait.web.live import Watcher

@@ -35,12 +35,8 @@ from mjxgait.training.examination import Examiner, due
 from mjxgait.training.examination import Validation as RunLooks
 from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Experiment, build_experiment
-from mjxgait.training.folder import (
-    CERTIFICATE,
-    EXAMS,
-    create_run,
-    read_metrics,
-)
+from mjxgait.training.folder import CERTIFICATE, EXAMS, create_run
+from mjxgait.training.logs import read_metrics
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import stored_generations
 

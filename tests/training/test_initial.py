@@ -16,8 +16,9 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.training import loop, stages
 from mjxgait.training.experiment import build_experiment
-from mjxgait.training.folder import create_run, read_metrics
+from mjxgait.training.folder import create_run
 from mjxgait.training.initial import INITIAL, initial_of, planted, read_initial
+from mjxgait.training.logs import read_metrics
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import read_stored
 

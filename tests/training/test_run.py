@@ -28,7 +28,8 @@ from mjxgait.creature import load_creature
 from mjxgait.training import stages
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.experiment import build_experiment
-from mjxgait.training.folder import open_run, read_metrics
+from mjxgait.training.folder import open_run
+from mjxgait.training.logs import read_metrics
 from mjxgait.training.loop import mend_champion
 
 SMALL = [

@@ -16,7 +16,8 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.training import loop, stages
 from mjxgait.training.experiment import build_batch
-from mjxgait.training.folder import create_run, open_run, read_metrics
+from mjxgait.training.folder import create_run, open_run
+from mjxgait.training.logs import read_metrics
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import read_stored
 from mjxgait.types import by_name

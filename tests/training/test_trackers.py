@@ -10,7 +10,7 @@ import pytest
 from helpers import STOOL, said_by
 
 from mjxgait.extras import install_command
-from mjxgait.training.folder import Line, append_lines, truncate_metrics
+from mjxgait.training.logs import Line, append_lines, truncate_metrics
 from mjxgait.training.trackers import TensorBoard, WandB, scalars
 
 

@@ -19,7 +19,7 @@ from mjxgait.experiments.ablation.measures import Result
 from mjxgait.experiments.ablation.plan import Plan
 from mjxgait.files import replaced
 from mjxgait.rendering.curves import ACCENT, DARK, figure
-from mjxgait.training.folder import Line
+from mjxgait.training.logs import Line
 
 RESAMPLES = 9999
 TRIM = 0.25

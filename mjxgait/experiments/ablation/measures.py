@@ -24,15 +24,8 @@ from mjxgait.plugins.user_code import load_all, loaded
 from mjxgait.processes import process_per_core, survivable
 from mjxgait.reference.starts import join, nominal_starts, perturbed_starts
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import (
-    CREATURE,
-    METRICS,
-    Line,
-    append_lines,
-    read_metrics,
-    read_records,
-    write_lines,
-)
+from mjxgait.training.folder import CREATURE, METRICS
+from mjxgait.training.logs import Line, append_lines, read_metrics, read_records, write_lines
 from mjxgait.training.stored import is_number
 
 MEASURED = "measured.jsonl"

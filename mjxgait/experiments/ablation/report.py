@@ -28,7 +28,7 @@ from mjxgait.experiments.ablation.measures import Result
 from mjxgait.experiments.ablation.plan import Plan
 from mjxgait.files import replaced, write_text
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import Line
+from mjxgait.training.logs import Line
 
 NAMES = {
     "walk": "body lengths per second covered before a fall or the end of 22 s, mean over 16 unseen "

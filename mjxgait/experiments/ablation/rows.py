@@ -14,12 +14,8 @@ from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.experiments.ablation.plan import Plan, Run
 from mjxgait.training.checkpoint import Checkpoints, Packed
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import (
-    METRICS,
-    Line,
-    append_lines,
-    truncate_metrics,
-)
+from mjxgait.training.folder import METRICS
+from mjxgait.training.logs import Line, append_lines, truncate_metrics
 from mjxgait.training.loop import interruptible
 
 if TYPE_CHECKING:

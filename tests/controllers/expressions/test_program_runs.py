@@ -23,7 +23,8 @@ from mjxgait.inspect import facts, read_snapshot
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.plots import plot_run
 from mjxgait.training.experiment import build_experiment
-from mjxgait.training.folder import CHAMPION, METRICS, read_metrics
+from mjxgait.training.folder import CHAMPION, METRICS
+from mjxgait.training.logs import read_metrics
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,8 @@ from mjxgait.inspect import read_snapshot
 from mjxgait.plugins import resolve_config
 from mjxgait.plugins.registry import build_config
 from mjxgait.training.experiment import build_experiment
-from mjxgait.training.folder import METRICS, read_metrics
+from mjxgait.training.folder import METRICS
+from mjxgait.training.logs import read_metrics
 
 # The program that Gritz & Hahn printed for the lamp, from the transcript of the slides, line by
 # line. The transcript lost every +, * and %, so one of them fills each missing function. Also

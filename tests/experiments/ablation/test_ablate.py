@@ -29,7 +29,7 @@ from mjxgait.errors import INTERRUPTED
 from mjxgait.experiments.ablation import findings, measures, rows
 from mjxgait.training import stages
 from mjxgait.training.checkpoint import Checkpoints, Packed
-from mjxgait.training.folder import read_metrics
+from mjxgait.training.logs import read_metrics
 
 STUDY = f"""
 question = "Does plain PD do as well?"

@@ -21,7 +21,8 @@ from mjxgait.creature import Creature
 from mjxgait.distributed.scheduler import Scheduler
 from mjxgait.experiments.repertoire.grid import POSES, Cell, Grid, evolve, mirrored
 from mjxgait.experiments.repertoire.neighbours import half_way
-from mjxgait.training.folder import METRICS, read_metrics
+from mjxgait.training.folder import METRICS
+from mjxgait.training.logs import read_metrics
 from mjxgait.training.stored import read_stored, stored_generations
 
 
