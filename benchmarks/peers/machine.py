@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.processes import cores, process_per_core
-from mjxgait.simulation.rollout import Lane
+from mjxgait.simulation.episode import Lane
 from mjxgait.training.experiment import Experiment
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from mjxgait.environments.problem import NO_OVERLAP, Problem, Progress, Verdict
 from mjxgait.physics import make_plant
 from mjxgait.physics.lane_major.lanes import separate_kernels
 from mjxgait.plugins.registry import what_ends
-from mjxgait.simulation.rollout import Late, arriving, first_body, pushed
+from mjxgait.simulation.episode import Late, arriving, first_body, pushed
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import BodyState, ModelPlant, Sensed, pytree
 

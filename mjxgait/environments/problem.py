@@ -1,7 +1,7 @@
 """The problem that an environment poses: trials, observations, actions, reward, end of an episode.
 
 Pure functions in JAX for one creature, whatever simulates it: `functional.py` in the physics of
-evolution, `gym.py` in C MuJoCo. The episode is that of `simulation.rollout`, so the return of an
+evolution, `gym.py` in C MuJoCo. The episode is that of `simulation.episode`, so the return of an
 episode is the task's fitness.
 """
 
@@ -22,7 +22,8 @@ from mjxgait.errors import UserError
 from mjxgait.plugins import make_task
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import what_ends
-from mjxgait.simulation.rollout import CHECK_EVERY, deepened, is_going, reason_of
+from mjxgait.simulation.episode import deepened, is_going, reason_of
+from mjxgait.simulation.rollout import CHECK_EVERY
 from mjxgait.tasks.base import EpisodeStats, Task, in_order
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import Starts

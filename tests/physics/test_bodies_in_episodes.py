@@ -15,7 +15,8 @@ from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.creature import Creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
-from mjxgait.simulation.rollout import Lane, Simulator
+from mjxgait.simulation.episode import Lane
+from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.walk.stats import WalkStats
 from mjxgait.training.experiment import build_experiment
 

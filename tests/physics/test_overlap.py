@@ -26,7 +26,8 @@ from mjxgait.creature.overlap import (
 from mjxgait.physics.derived import observation_layout
 from mjxgait.physics.lane_major import lane_major_plant
 from mjxgait.physics.mjx import mjx_plant
-from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
+from mjxgait.simulation.episode import Lane
+from mjxgait.simulation.rollout import CHECK_EVERY, Simulator
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.terms import DEEP, TOUCHING
 from mjxgait.tasks.walk.config import WalkConfig

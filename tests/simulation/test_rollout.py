@@ -20,8 +20,9 @@ from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.creature import Creature, load_creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
+from mjxgait.simulation.episode import reason_of
 from mjxgait.simulation.evaluator import Local
-from mjxgait.simulation.rollout import Episodes, reason_of
+from mjxgait.simulation.rollout import Episodes
 from mjxgait.tasks.base import in_order
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import NEVER, Starts, draw_starts
