@@ -57,7 +57,8 @@ class BodyState:
     friction: [] factor on the floor's sliding friction.
     parameters: this lane's own body parameters, as from `ModelPlant.parameters_of`; None where
     the plant's apply.
-    ground: a `Ground` under this lane's creature; None for the plane z = 0, which costs nothing.
+    ground: a `Ground` under this lane's creature, or the `Medium` of a modular body; None for the
+    plane z = 0, which costs nothing.
     """
 
     qpos: jax.Array

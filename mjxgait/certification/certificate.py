@@ -40,7 +40,7 @@ class Certificate:
 
     champion: fingerprint of the examined champion. report: numbers without a threshold.
     seconds: duration of the examination. attempts: examinations of its run, this one included.
-    skills: certificates of the skills, by task, from which it is made; the file has no such entry.
+    skills: certificates by skill that make up this one; not in the file.
     """
 
     creature: str

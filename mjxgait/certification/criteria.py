@@ -68,6 +68,12 @@ class Criterion:
         """Margin of the worst measure."""
         return min((m.margin for m in self.measures), default=-np.inf)
 
+    @property
+    def skill(self) -> str:
+        """Skill that it is about, of a body with several, and a space; else empty."""
+        skill, colon, _ = self.name.partition(": ")
+        return f"{skill} " if colon else ""
+
 
 def failures(*criteria: Criterion) -> int:
     """Number of measures that do not pass."""

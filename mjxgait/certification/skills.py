@@ -4,6 +4,7 @@ Each skill is examined as a champion of its own task, on the body in its own med
 """
 
 import dataclasses
+import re
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -117,7 +118,16 @@ def _report(each: Sequence[tuple[str, Certificate]]) -> dict[str, Any]:
     first = each[0][1].report
     found: dict[str, Any] = {key: first[key] for key in SHARED if key in first}
     found["summary"] = "; ".join(f"{title_of(t)}: {one.report['summary']}" for t, one in each)
-    advice = [f"{title_of(t)}: {said}" for t, one in each for said in one.report.get(ADVICE, [])]
+    advice = [
+        f"{title_of(task)}: {of_skill(said, task)}"
+        for task, one in each
+        for said in one.report.get(ADVICE, [])
+    ]
     if advice:
         found[ADVICE] = advice
     return found | {"skills": {task: one.report for task, one in each}}
+
+
+def of_skill(remedy: str, task: str) -> str:
+    """Return a remedy for a skill's own task as one for a run with several skills."""
+    return re.sub(r"\bfitness\.", f"fitness.{task}.", remedy)

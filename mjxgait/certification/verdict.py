@@ -81,6 +81,11 @@ class Verdict:
         return [criterion.number for criterion in self.failed]
 
     @property
+    def labels(self) -> list[str]:
+        """Numbers of the criteria that do not pass, with the skill of a body with several."""
+        return [f"{criterion.skill}{criterion.number}" for criterion in self.failed]
+
+    @property
     def reservation(self) -> str:
         """Reason against a certificate although all criteria pass; empty if there is none."""
         if self.contradiction:
@@ -141,13 +146,13 @@ def other_rules(document: Document) -> Iterator[str]:
 def _contradiction(document: Document, verdict: Verdict) -> str:
     """Return a sentence if a stored result is not that of its measures; else empty."""
     pairs = zip(criteria_of(document), document["criteria"], strict=True)
-    wrong = [criterion.number for criterion, said in pairs if said["passed"] != criterion.passed]
+    wrong = [f"{c.skill}{c.number}" for c, said in pairs if said["passed"] != c.passed]
     if document["passed"] == verdict.passed and not wrong:
         return ""
     stored = "passed" if document["passed"] else "failed"
     measured = "passed" if verdict.passed else "failed"
     if document["passed"] == verdict.passed:
-        measured = f"otherwise of criteria {' '.join(map(str, wrong))}"
+        measured = f"otherwise of criteria {' '.join(wrong)}"
     return f"the file contradicts itself: it says {stored}, its measures say {measured}"
 
 

@@ -8,10 +8,10 @@ from mjxgait.champion.record import (
     write_champion,
 )
 from mjxgait.champion.serializers import Serializer, serializer_of
-from mjxgait.champion.skills import SKILLS, by_skill
+from mjxgait.champion.skills import TRIALS, by_skill
 
 __all__ = [
-    "SKILLS",
+    "TRIALS",
     "Champion",
     "DamagedChampion",
     "Serializer",

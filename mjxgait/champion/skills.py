@@ -1,13 +1,12 @@
 """Champions with several skills: each skill as a champion of its own task."""
 
 import dataclasses
-
-import numpy as np
+from collections.abc import Mapping
 
 from mjxgait.champion.record import Champion
 from mjxgait.kinds import skills_of
 
-SKILLS = "skills"
+TRIALS = "skills"
 """Key of a champion's origin: metrics of the undisturbed trial of each skill, by task."""
 
 
@@ -19,13 +18,20 @@ def by_skill(champion: Champion) -> dict[str, Champion]:
 
 
 def _doing(champion: Champion, task: str, number: int) -> Champion:
-    nominal = champion.origin.get(SKILLS, {}).get(task, {})
-    counted = nominal.get("seconds", np.nan) - nominal.get("since", np.nan)
-    speed = nominal.get("way", np.nan) / counted if counted > 0 else np.nan
+    origin = dict(champion.origin)
+    nominal = origin.pop(TRIALS, {}).get(task, {})
     return dataclasses.replace(
         champion,
         task=task,
         settings=dataclasses.replace(champion.settings, skill=number),
-        terms={"speed": speed},
-        origin={**champion.origin, "nominal": nominal},
+        terms=_performance(nominal),
+        origin={**origin, "nominal": nominal},
     )
+
+
+def _performance(nominal: Mapping[str, float]) -> dict[str, float]:
+    """Return the height of a jumper in m, the speed of others in m/s; empty if nothing counted."""
+    if height := nominal.get("height"):
+        return {"height": height}
+    counted = nominal.get("seconds", 0.0) - nominal.get("since", 0.0)
+    return {"speed": nominal["way"] / counted} if counted > 0 else {}

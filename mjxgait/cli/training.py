@@ -35,7 +35,15 @@ from mjxgait.tasks.walk.targets import (
     hint,
 )
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import METRICS, PLOT, PLOTS, command, create_run, open_run
+from mjxgait.training.folder import (
+    METRICS,
+    PLOT,
+    PLOTS,
+    command,
+    create_run,
+    open_run,
+    shows_skill_of,
+)
 from mjxgait.training.logs import read_metrics
 
 if TYPE_CHECKING:  # JAX takes a second to import
@@ -74,6 +82,8 @@ def train(arguments: Sequence[str]) -> int:
         raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
     if options.resume is None:
         return _until_certified(options, creature, config)
+    if whole := shows_skill_of(options.resume):
+        raise UserError(f"{options.resume}: it shows one skill of {whole}; resume that run")
     _check_resumed(options, config, default)
     from mjxgait.training.ended import nothing_left  # leads to JAX
     from mjxgait.training.initial import has_begun

@@ -88,7 +88,7 @@ def certificate(snapshot: Snapshot) -> str:
         return document
     found = verdict_of(document)
     if not found.passed:
-        failed = " ".join(map(str, found.numbers))
+        failed = (", " if found.failed[0].skill else " ").join(found.labels) if found.failed else ""
         failure = (
             f"fails criteria {failed}" if failed else "is not certified: there are no criteria"
         )

@@ -103,7 +103,16 @@ def _check_skills(name: str, config: Config) -> None:
             f"{name}: rollout.starts = {config.rollout.starts}, and the {count} skills of {task} share the "
             f"trials equally; take a multiple of {count} from {least} on"
         )
+    if config.rollout.promote < 1:
+        raise UserError(
+            f"{name}: rollout.promote = {config.rollout.promote:g} would choose by the first skill alone; "
+            f"take --rollout.promote 1 for {task}"
+        )
     own: Any = config.controller
+    if own.skill:
+        raise UserError(
+            f"{name}: controller.skill = {own.skill}, and {task} commands its skills; leave it out"
+        )
     if own.skills != count:
         raise UserError(
             f"{name}: controller.skills = {own.skills}, and {task} has {count} skills; take "
@@ -116,13 +125,16 @@ def _check_skills(name: str, config: Config) -> None:
 def _check_settings(name: str, config: Config) -> None:
     """Refuse settings that need an existing body, and episodes that end before scoring begins."""
     rollout = config.rollout
-    skills = [getattr(config.fitness, skill) for skill in skills_of(config.use.task)]
-    settle = max(getattr(one, "settle", 0.0) for one in skills or [config.fitness])
-    if settle >= rollout.seconds:
-        raise UserError(
-            f"{name}: fitness.settle = {settle:g} s do not count, and an episode lasts "
-            f"{rollout.seconds:g} s; make rollout.seconds longer or fitness.settle shorter"
-        )
+    skills = {
+        f"fitness.{skill}": getattr(config.fitness, skill) for skill in skills_of(config.use.task)
+    }
+    for table, own in (skills or {"fitness": config.fitness}).items():
+        settle = getattr(own, "settle", 0.0)
+        if settle >= rollout.seconds:
+            raise UserError(
+                f"{name}: {table}.settle = {settle:g} s do not count, and an episode lasts "
+                f"{rollout.seconds:g} s; make rollout.seconds longer or {table}.settle shorter"
+            )
     needs = {
         "evolution.body": config.evolution.body != 1.0,
         "evolution.pose_span": config.evolution.pose_span != 0.0,

@@ -33,7 +33,8 @@ class Starts:
     stiffness, damping: [R, J] factors on the joints' kp and kd.
     mass_scale: [R, nbody - 1] factors on the parts' masses and inertias; None if all are 1.
     numbers: leaves [R, ...], the body parameters that follow from it, as the plant reads them.
-    ground: leaves [R, ...], one per trial; None if all are flat.
+    ground: leaves [R, ...], one per trial, a `Ground`, or the `Medium` of modular bodies; None if
+      all are flat.
     goal: leaves [R, ...], what the task adds to a trial, as its `Task.goal` reads it; None if it
       adds nothing.
     delay: [R] control steps by which torques are late; None if they never are.
@@ -46,7 +47,7 @@ class Starts:
     push_step: jax.Array
     stiffness: jax.Array
     damping: jax.Array
-    ground: Ground | None = None
+    ground: Any = None
     mass_scale: jax.Array | None = None
     numbers: object = None
     goal: Any = None

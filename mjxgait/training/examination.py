@@ -229,8 +229,13 @@ class Examiner:
 
 def _missed(certificate: Certificate) -> str:
     """Return the measures that fail, with their thresholds."""
-    rows = [row[1:] for row in certificate.rows() if row[-1] == "FAIL"]
-    return listed([f"{name} {value} ({limit} required)" for name, value, limit, _ in rows], 3)
+    missed = [
+        f"{criterion.skill}{m.name} {m.value:.3g} ({m.sense} {m.threshold:g} required)"
+        for criterion in certificate.criteria
+        for m in criterion.measures
+        if not m.passed
+    ]
+    return listed(missed, 3)
 
 
 def due(settings: ExaminationConfig, generation: int) -> bool:

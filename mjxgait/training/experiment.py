@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.champion import SKILLS, Champion
+from mjxgait.champion import TRIALS, Champion
 from mjxgait.config.schema import Config
 from mjxgait.config.traced import traced, traced_structure
 from mjxgait.creature import Creature
@@ -174,7 +174,7 @@ class Experiment:
         if skills := skills_of(self.config.use.task):
             # The first trial of each skill is undisturbed.
             each = [dict(zip(task.outcomes, map(float, one), strict=True)) for one in outcome[rank]]
-            origin[SKILLS] = dict(zip(skills, each, strict=False))
+            origin[TRIALS] = dict(zip(skills, each, strict=False))
         return Champion.of(
             self.creature,
             self.config,

@@ -113,6 +113,8 @@ CREATURE, METRICS, CHAMPION = "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
 PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
 ISLANDS, MIGRATIONS, ANCESTORS = "islands", "migrations.jsonl", "ancestors"
+SKILLS = "skills"
+"""Folder of run folders that show one skill each of the run's champion; see `skill_runs`."""
 
 
 RUN_FILES = (CONFIG, OWN, METRICS, CHAMPION, CERTIFICATE, STRESS, EXAMS, PLOT, MIGRATIONS)
@@ -200,10 +202,21 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
     """
     folder = check_run(folder, creature, config)
     with writing(folder):
-        write_creature(folder / CREATURE, creature.files)
-        keep_places(folder, config.use)
-        write_text(folder / CONFIG, f"{_made_by(own_version())}\n{dump_toml(config)}")
+        write_setup(folder, creature, config)
     return folder
+
+
+def write_setup(folder: Path, creature: Creature, config: Config) -> None:
+    """Write the creature and the settings of a run into its folder."""
+    write_creature(folder / CREATURE, creature.files)
+    keep_places(folder, config.use)
+    write_text(folder / CONFIG, f"{_made_by(own_version())}\n{dump_toml(config)}")
+
+
+def shows_skill_of(folder: Path) -> Path | None:
+    """Return the run of whose champion a folder shows one skill; None for a run of its own."""
+    skills = folder.absolute().parent
+    return skills.parent if skills.name == SKILLS and (skills.parent / CONFIG).exists() else None
 
 
 def write_creature(folder: Path, files: Mapping[str, str]) -> None:

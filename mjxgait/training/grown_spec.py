@@ -37,7 +37,7 @@ class GraphGrowth(Growth[TreePlant, Genotype]):
         tree = body_of(genome.graph, self.capacity).tree
         bent = start.qpos[7:] * tree.moves[1:]
         qpos = jnp.concatenate([start.qpos[:7], bent])
-        medium: Medium | None = start.ground  # type: ignore[assignment]  # the ground of these
+        medium: Medium | None = start.ground
         rested = plant.rested(tree, qpos)
         qpos = rested if medium is None else jnp.where(medium.wet > 0, qpos, rested)
         return dataclasses.replace(start, qpos=qpos, numbers=tree)

@@ -126,8 +126,8 @@ def check_initial(initial: Initial, experiment: Experiment) -> None:
     if name := first_difference(found, wanted):
         raise UserError(
             f"{initial.source}: its genomes have {name} of shape {found.get(name, 'none')}, "
-            f"the new run's {wanted.get(name, 'none')}; give the new run the same settings of "
-            "the controller"
+            f"the new run's {wanted.get(name, 'none')}; evolve both with the same settings of the "
+            "controller"
         )
 
 

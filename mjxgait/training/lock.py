@@ -16,7 +16,7 @@ from typing import BinaryIO
 
 from mjxgait.errors import UserError
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import command
+from mjxgait.training.folder import command, shows_skill_of
 
 try:
     import fcntl
@@ -76,6 +76,8 @@ def why_empty(run: Path) -> str:
     """Return why a run has no results yet."""
     if writer := running(run):
         return f"it runs now ({writer}) and has not done its first generation"
+    if whole := shows_skill_of(run):
+        return f"it shows one skill of {whole}; name that run"
     resume = command("train", "--resume", run, run=run)
     return f"the run ended before its first generation was done; `{resume}` goes on with it"
 

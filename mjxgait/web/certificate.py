@@ -36,10 +36,12 @@ def certificate_summary(run: Path, creature: Creature, champion: Champion) -> st
     document = read_certificate(run / CERTIFICATE)
     if document is None or outdated(document, champion, creature):
         return ""
-    verdict, measures = verdict_of(document), [m for c in criteria_of(document) for m in c.measures]
-    nearest = sorted(measures, key=lambda measure: measure.margin)[:TIGHTEST]
+    verdict = verdict_of(document)
+    measures = [(c.skill, m) for c in criteria_of(document) for m in c.measures]
+    nearest = sorted(measures, key=lambda pair: pair[1].margin)[:TIGHTEST]
     listed = "; ".join(
-        f"{m.name} {_show(m.value)} ({SIGNS[m.sense]} {m.threshold:g})" for m in nearest
+        f"{skill}{m.name} {_show(m.value)} ({SIGNS[m.sense]} {m.threshold:g})"
+        for skill, m in nearest
     )
     worst = f" Margin {verdict.margin:.2f}." if math.isfinite(verdict.margin) else ""
     said = f"<b>{html.escape(_said(verdict))}</b>{worst}"

@@ -12,6 +12,7 @@ import pytest
 from mjxgait.certification.advice import ADVICE, FELL_AFTER, advice, advised, entry_of
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.certification.remedies import AGAIN, TABLE
+from mjxgait.certification.skills import of_skill
 from mjxgait.cli.train_options import TrainOptions
 from mjxgait.config.schema import UseConfig
 from mjxgait.creature import Creature
@@ -111,12 +112,17 @@ def known_options(task: str) -> set[str]:
     )
 
 
-@pytest.mark.parametrize("task", tasks())
-def test_every_option_in_a_remedy_exists(task: str):
-    known = known_options(task)
-    for name in (name for name, of in STATED.items() if task in of):
+@pytest.mark.parametrize(
+    ("task", "skill"),
+    [(task, skill) for task, kind in tasks().items() for skill in kind.skills or (None,)],
+)
+def test_every_option_in_a_remedy_exists(task: str, skill: str | None):
+    """Of a body with several skills too: options of a skill's fitness are in a table of its own."""
+    known, own = known_options(task), skill or task
+    for name in (name for name, of in STATED.items() if own in of):
         for entry in entries_on(name):
-            remedy = entry.remedy_for(task)
+            remedy = entry.remedy_for(own)
+            remedy = of_skill(remedy, skill) if skill else remedy
             imports = {"search"} if "mjxgait import" in remedy else set()
             assert options_in(remedy) <= known | imports, remedy
 

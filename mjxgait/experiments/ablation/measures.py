@@ -16,7 +16,7 @@ from mjxgait.certification import certify
 from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
-from mjxgait.champion import Champion, read_champion
+from mjxgait.champion import Champion, by_skill, read_champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.experiments.ablation.plan import Plan, Run, Study
 from mjxgait.experiments.ablation.rows import GROUPS, champion_path
@@ -180,8 +180,13 @@ def _creature(folder: Path) -> Creature:
 def walked(creature: Creature, champion: Champion) -> tuple[float, float, float]:
     """Return mean speed and success share over the unseen starts, and the nominal start's speed.
 
-    Speeds are in body lengths per second; the nominal one is 0 after a fall.
+    Speeds are in body lengths per second; the nominal one is 0 after a fall. Of several skills the
+    worst value of each counts.
     """
+    if skills := by_skill(champion).values():
+        each = [walked(one.embodied(creature), one) for one in skills]
+        speed, share, nominal = map(min, zip(*each, strict=True))
+        return speed, share, nominal
     config, rng = CertificateConfig(), np.random.default_rng(SEED)
     acceptance = acceptance_of(champion.task, champion.wish)
     unseen = acceptance.aimed(perturbed_starts(creature, STARTS, rng), config, rng)

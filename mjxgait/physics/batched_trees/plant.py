@@ -69,7 +69,7 @@ LEVEL = Level()
 class Touch:
     """Geometry of all contacts.
 
-    distance: [4 n, L] m above the ground, `FAR` for missing blocks.
+    distance: [4 n, L] m above the ground, `FAR` for missing blocks and in water.
     points: x, y, z [4 n, L] m from the origin.
     """
 
@@ -282,7 +282,10 @@ class TreePlant(Plant[Moment]):
         momentum: jax.Array,
         washed: jax.Array,
     ) -> Sensed:
-        """Sense the root as trunk and every block as watched; missing blocks are far up."""
+        """Sense the root as trunk and every block as watched.
+
+        Missing blocks are far up, in water all are.
+        """
         tree: Tree = state.parameters
         centre = [c + state.qpos[i] for i, c in enumerate(centres(tree, poses))]
         weight, low = tree.mass / jnp.sum(tree.mass, axis=0), lows(tree, poses)

@@ -47,7 +47,7 @@ KINDS = (
     _kind(
         "amphibian",
         task="skills:Amphibian",
-        criteria="skills_criteria:Amphibian",
+        criteria="skills_criteria:amphibian",
         water=True,
         tables=("swim", "roam"),
         skills=("swim", "roam"),
@@ -56,7 +56,7 @@ KINDS = (
     _kind(
         "all-trades",
         task="skills:AllTrades",
-        criteria="skills_criteria:AllTrades",
+        criteria="skills_criteria:all_trades",
         water=True,
         tables=("swim", "roam", "jump", "follow"),
         skills=("swim", "roam", "jump", "follow"),

@@ -124,12 +124,40 @@ class JumpConfig(ModularConfig):
     weights: JumpWeights = dataclasses.field(default_factory=JumpWeights)
 
 
-def _at_once() -> RoamConfig:
-    return RoamConfig(apart=0.0, weights=RoamWeights(vibration=1.0))
+@dataclasses.dataclass(frozen=True)
+class RoamSkillWeights(RoamWeights):
+    """Weights of walking as one of several skills: fast walkers vibrate.
+
+    Attributes:
+      vibration: as in `RoamWeights`.
+    """
+
+    __pydantic_config__ = STRICT
+    vibration: Annotated[NonNegative, ADDED] = 1.0
 
 
-def _after_turning() -> SwimConfig:
-    return SwimConfig(settle=4.0)
+@dataclasses.dataclass(frozen=True)
+class RoamSkillConfig(RoamConfig):
+    """Parameters of walking as one of several skills.
+
+    Attributes:
+      weights: weight of each term.
+    """
+
+    __pydantic_config__ = STRICT
+    weights: RoamSkillWeights = dataclasses.field(default_factory=RoamSkillWeights)
+
+
+@dataclasses.dataclass(frozen=True)
+class FollowSkillConfig(SwimConfig):
+    """Parameters of following as one of several skills.
+
+    Attributes:
+      settle: s from the start that do not count: the time to turn.
+    """
+
+    __pydantic_config__ = STRICT
+    settle: NonNegative = 4.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -170,6 +198,6 @@ class SkillsConfig:
     least: Annotated[float, pydantic.Field(gt=0, lt=1)] = 0.02
     most: Positive = 1.5
     swim: SwimConfig = dataclasses.field(default_factory=SwimConfig)
-    roam: RoamConfig = dataclasses.field(default_factory=_at_once)
+    roam: RoamSkillConfig = dataclasses.field(default_factory=RoamSkillConfig)
     jump: JumpConfig = dataclasses.field(default_factory=JumpConfig)
-    follow: SwimConfig = dataclasses.field(default_factory=_after_turning)
+    follow: FollowSkillConfig = dataclasses.field(default_factory=FollowSkillConfig)

@@ -34,11 +34,11 @@ LATE = 1_000_000
 
 
 @pytree
-class Command:
-    """Goal of a trial. skill: [] number of the commanded one. light: for a skill that follows it."""
+class Commanded:
+    """Goal of a trial. skill: [] number of the commanded one. light: None if no skill follows one."""
 
     skill: jax.Array
-    light: Light
+    light: Light | None
 
 
 @pytree
@@ -78,9 +78,10 @@ class Skills(ModularTask):
         own = (1 + others) // count
         drawn = dataclasses.replace(settings, starts=1 + (own - 1) * rounds)
         each = [
-            _lit(task.trials(jax.random.fold_in(key, 10 + skill), creature, drawn))
+            task.trials(jax.random.fold_in(key, 10 + skill), creature, drawn)
             for skill, task in enumerate(self.each)
         ]
+        each = [_lit(own) for own in each] if self._follower else each
         turn = np.arange(settings.starts - 1)
         trial, number = np.append(0, 1 + turn % others), np.append(0, turn // others)
         skill, again = trial % count, trial // count
@@ -88,22 +89,24 @@ class Skills(ModularTask):
         chosen: Starts = jax.tree.map(lambda *leaves: jnp.stack(leaves)[skill, place], *each)
         wet = np.array([in_water(name) for name in self.tasks])
         mixed = wet.any() and not wet.all()
-        ground: Any = Medium(jnp.asarray(np.float32(wet[skill]))) if mixed else None
-        goal = Command(jnp.asarray(skill, jnp.int32), chosen.goal)
+        ground = Medium(jnp.asarray(np.float32(wet[skill]))) if mixed else None
+        goal = Commanded(jnp.asarray(skill, jnp.int32), chosen.goal)
         return dataclasses.replace(chosen, goal=goal, ground=ground)
 
-    def goal(self, trial: Starts) -> Command:
+    def goal(self, trial: Starts) -> Commanded:
         """The skill, and the light at its places in the world."""
-        command: Command = trial.goal
-        start, light = trial.qpos[:3], command.light
-        place = Light(start + light.place, start + light.later, jnp.asarray(light.steps))
-        return Command(jnp.asarray(command.skill), place)
+        commanded: Commanded = trial.goal
+        task, light = self._follower, commanded.light
+        if task is not None:
+            light = task.goal(dataclasses.replace(trial, goal=light))
+        return Commanded(jnp.asarray(commanded.skill), light)
 
     @override
-    def next_goal(self, goal: Command, sensed: Sensed) -> Command:
+    def next_goal(self, goal: Commanded, sensed: Sensed) -> Commanded:
         task = self._follower
-        light = goal.light if task is None else task.next_goal(goal.light, sensed)
-        return dataclasses.replace(goal, light=light)
+        if task is None or goal.light is None:
+            return goal
+        return dataclasses.replace(goal, light=task.next_goal(goal.light, sensed))
 
     @override
     def params(self, settings: SkillsConfig) -> Any:
@@ -111,10 +114,10 @@ class Skills(ModularTask):
         return tuple(task.params(own) for task, own in self._own(settings))
 
     @override
-    def observations(self, goal: Command, sensed: Sensed) -> Mapping[str, jax.Array]:
+    def observations(self, goal: Commanded, sensed: Sensed) -> Mapping[str, jax.Array]:
         """The skill, and the light's direction if the skill follows it."""
         seen = {"skill": goal.skill}
-        if (task := self._follower) is not None:
+        if (task := self._follower) is not None and goal.light is not None:
             light = task.observations(goal.light, sensed)["light"]
             seen["light"] = jnp.where(goal.skill == self.each.index(task), light, 0.0)
         return seen
@@ -127,7 +130,7 @@ class Skills(ModularTask):
 
     @override
     def update(
-        self, stats: SkillsStats, sensed: Sensed, torque: jax.Array, params: Any, goal: Command
+        self, stats: SkillsStats, sensed: Sensed, torque: jax.Array, params: Any, goal: Commanded
     ) -> SkillsStats:
         """Update the statistics of all tasks; the commanded one may end the episode."""
         each = tuple(
@@ -146,8 +149,8 @@ class Skills(ModularTask):
     def evaluate(self, stats: SkillsStats, settings: SkillsConfig) -> Mapping[str, jax.Array]:
         """Score of the commanded skill; 0 for the others.
 
-        By the logarithm the mean ranks as the geometric mean of the performances: twice as much of
-        the worst skill counts as much as twice of the best.
+        By the logarithm the mean ranks as the geometric mean of the performances: doubling the
+        worst skill counts as much as doubling the best, within `least` and `most`.
         """
         found = {}
         for skill, (name, one) in enumerate(zip(self.tasks, self._ended(stats), strict=True)):
@@ -162,7 +165,7 @@ class Skills(ModularTask):
 
     @override
     def outcome(self, stats: SkillsStats) -> Mapping[str, jax.Array]:
-        """Distance and height in m, s until the end, s that do not count."""
+        """Distance and height in m, duration and uncounted time in s."""
         ways, heights = [], []
         for task, one in zip(self.each, self._ended(stats), strict=True):
             known = task.outcome(one)

@@ -1,4 +1,4 @@
-"""Acceptance criteria of bodies with several skills: what is simulated is the first skill.
+"""Acceptance criteria of bodies with several skills; plain simulations show the first skill.
 
 `certification.skills` examines every skill by the criteria of its own task.
 """
@@ -8,44 +8,43 @@ from collections.abc import Mapping
 import numpy as np
 from typing_extensions import override
 
+from mjxgait.certification.acceptance import acceptance_of
 from mjxgait.creature import Creature
-from mjxgait.tasks.modular.criteria import (
-    JumpCriteria,
-    ModularCriteria,
-    RoamCriteria,
-    SwimCriteria,
-)
-from mjxgait.tasks.modular.follow_criteria import in_water
+from mjxgait.kinds import skills_of
+from mjxgait.tasks.modular.criteria import SwimCriteria
 
 
-class Amphibian(SwimCriteria):
-    """Implementation of `AcceptanceCriteria`. each: the criteria of the skills, in their order."""
+class SkillsCriteria(SwimCriteria):
+    """Implementation of `AcceptanceCriteria`. task: the one with skills, of which swimming is first.
 
-    verdict = "it swims and walks"
-    worth = 1.0
+    each: the criteria of the skills, in their order.
+    """
 
-    def __init__(self) -> None:
-        self.each: tuple[ModularCriteria, ...] = (SwimCriteria(), RoamCriteria())
+    def __init__(self, task: str, verdict: str) -> None:
+        self.each = tuple(map(acceptance_of, skills_of(task)))
+        self.verdict = verdict
         self.revision = sum(one.revision for one in self.each)
 
     @override
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """Each trial as the task of its skill demands; the skills take turns."""
-        each = np.array([one.managed(outcome, seconds, creature) for one in self.each])
-        trial = np.arange(each.shape[1])
-        found: np.ndarray = each[trial % len(each), trial]
-        return found
+        """All trials or none: each skill must be worth validating by its own trials."""
+        count = len(self.each)
+        trials = len(outcome["seconds"])
+        worth = [
+            one.managed({n: a[k::count] for n, a in outcome.items()}, seconds, creature).mean()
+            >= one.worth
+            for k, one in enumerate(self.each)
+        ]
+        return np.full(trials, all(worth))
 
 
-class AllTrades(Amphibian):
-    """Implementation of `AcceptanceCriteria`."""
+def amphibian() -> SkillsCriteria:
+    """Return the criteria of a body that swims and walks."""
+    return SkillsCriteria("amphibian", "it swims and walks")
 
-    verdict = "it swims, walks, jumps and follows a light"
-    worth = 0.75
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.each = (*self.each, JumpCriteria(), in_water())
-        self.revision = sum(one.revision for one in self.each)
+def all_trades() -> SkillsCriteria:
+    """Return the criteria of a body that also jumps and follows a light."""
+    return SkillsCriteria("all-trades", "it swims, walks, jumps and follows a light")
