@@ -72,14 +72,14 @@ class Way:
         given |= {"style": self.style, "gait": self.gait}
         words = [w for key, value in given.items() if value for w in (f"--{key}", value)]
         grows = creature_of(self.creature).settings.creature.grows
-        few = (*FEW_BLOCKS, *_settled_soon(task_of(self))) if grows else ()
+        few = (*FEW_BLOCKS, *settled_soon(task_of(self))) if grows else ()
         rollout = read_config(self.config).get("rollout", {}) if self.config else {}
         # With the usual seed the best of so few followers is a body without a hinge.
         few += ("--seed", "8") if (self.task, self.config) == ("follow", None) else ()
         return [*words, *few, *(FEW_STARTS if rollout.get("variety", 1) > 1 else ())]
 
 
-def _settled_soon(task: str) -> tuple[str, ...]:
+def settled_soon(task: str) -> tuple[str, ...]:
     """Return options with which an episode of a modular body is longer than settling."""
     tables = [f"{skill}." for skill in skills_of(task)] or [""]
     return tuple(word for table in tables for word in (f"--fitness.{table}settle", "0.1"))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import jax
 import pytest
-from end_to_end.shipped import BENCHMARKS, FEW_BLOCKS, ROOT, SCRIPTS, TINY
+from end_to_end.shipped import BENCHMARKS, FEW_BLOCKS, ROOT, SCRIPTS, TINY, settled_soon
 from end_to_end.walks import faller, short_examination, trained, walker
 from helpers import STOOL
 
@@ -86,7 +86,9 @@ FORMS: dict[str, Given] = {
     "bodies.py": lambda folder: [*STOOLS, "--rounds", "1"],
     "cluster_paper.py": on_paper,
     "contacts.py": lambda folder: [*STOOLS, "--points", "4", "--rounds", "1"],
-    "diversity.py": lambda folder: [str(trained(folder / "run", "--env", "blocks", *FEW_BLOCKS))],
+    "diversity.py": lambda folder: [
+        str(trained(folder / "run", "--env", "blocks", *FEW_BLOCKS, *settled_soon("swim")))
+    ],
     "every_creature.py": lambda folder: [*STOOLS, "--seeds", "7", "--out", "out", "--", *TINY],
     "ground.py": lambda folder: [*STOOLS, "--rounds", "1"],
     "imported.py": lambda folder: [
