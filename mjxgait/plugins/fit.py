@@ -44,6 +44,11 @@ def _check_options(creature: Creature, config: Config) -> None:
             f"{name}: evolution.family is for one population, and islands are several as they are; "
             "take --evolution.family 1"
         )
+    if getattr(config.controller, "in_phase", False) and config.controller.mirror:
+        raise UserError(
+            f"{name}: controller.in_phase makes each pose its own mirror image, so with "
+            "controller.mirror each would come twice; take --controller.no-mirror, or --gait bound"
+        )
     if around := getattr(config.controller, "around", ()):
         wanted = config.controller.key_poses * len(creature.joints.names)
         if len(around) != wanted:
