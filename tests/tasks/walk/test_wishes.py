@@ -589,7 +589,7 @@ def test_anywhere_trains_on_everything_its_certificate_tests(body: Creature):
 def test_poses_that_are_their_own_image_make_a_whole_cycle(body: Creature):
     """With the mirrored half each pose would come twice."""
     twice = dataclasses.replace(Config().controller, in_phase=True)
-    with pytest.raises(UserError, match="take --controller.no-mirror"):
+    with pytest.raises(UserError, match=r"take --controller\.no-mirror"):
         check_fit(body, dataclasses.replace(Config(), controller=twice))
     whole = dataclasses.replace(twice, mirror=False)
     check_fit(body, dataclasses.replace(Config(), controller=whole))
