@@ -13,7 +13,7 @@ from mjxgait.errors import UserError
 from mjxgait.files import path_of, write_text
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.exams import Exams
-from mjxgait.training.folder import CERTIFICATE, EXAMS, command, open_run
+from mjxgait.training.folder import CERTIFICATE, EXAMS, command
 from mjxgait.training.skill_runs import write_skill_runs
 
 
@@ -27,9 +27,8 @@ def certify(run: Run | Place, config: Place | None = None) -> Certificate:
     """
     known = opened(run)
     certificate, path = examine(known, config), known.folder / CERTIFICATE
-    creature, _ = open_run(known.folder)
     with disk_errors(path, "what was there before is as it was", "examine it again"):
-        write_skill_runs(known.folder, creature, known.champion, certificate)
+        write_skill_runs(known.folder, known.champion, certificate)
         write_text(path, certificate.to_json())
     return certificate
 

@@ -6,7 +6,7 @@ Each skill is examined as a champion of its own task, on the body in its own med
 import dataclasses
 import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from mjxgait.certification import certificate, trials
@@ -56,7 +56,7 @@ def certify(
 
     See `certificate.certify` for arguments and errors.
     """
-    began, skills = time.perf_counter(), list(_skills(creature, champion))
+    began, skills = time.perf_counter(), _skills(creature, champion)
     if not skills:
         return certificate.certify(creature, champion, config, threads, seen, attempts)
     known = seen.each if isinstance(seen, SkillsCheck) else (None,) * len(skills)
@@ -87,7 +87,7 @@ def trial_run(
     caution: float = 0.0,
 ) -> float:
     """Return the worst margin of all skills; see `trials.trial_run`."""
-    skills = list(_skills(creature, champion))
+    skills = _skills(creature, champion)
     if not skills:
         return trials.trial_run(creature, champion, count, config, wanted, caution)
     worst = float("inf")
@@ -98,10 +98,9 @@ def trial_run(
     return worst
 
 
-def _skills(creature: Creature, champion: Champion) -> Iterator[tuple[str, Creature, Champion]]:
-    """Yield each skill's task, the body in its medium, and the champion that does it."""
-    for task, one in by_skill(champion).items():
-        yield task, one.embodied(creature), one
+def _skills(creature: Creature, champion: Champion) -> list[tuple[str, Creature, Champion]]:
+    """Return each skill's task, the body in its medium, and the champion that does it."""
+    return [(task, one.embodied(creature), one) for task, one in by_skill(champion).items()]
 
 
 def _named(each: Sequence[tuple[str, Sequence[Criterion]]]) -> tuple[Criterion, ...]:

@@ -214,7 +214,7 @@ def write_setup(folder: Path, creature: Creature, config: Config) -> None:
 
 
 def shows_skill_of(folder: Path) -> Path | None:
-    """Return the run of whose champion a folder shows one skill; None for a run of its own."""
+    """Return the run if a folder shows one skill of its champion; None for any other folder."""
     skills = folder.absolute().parent
     return skills.parent if skills.name == SKILLS and (skills.parent / CONFIG).exists() else None
 

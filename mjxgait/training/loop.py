@@ -201,7 +201,7 @@ def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examine
         body = examined.champion.embodied(creature)
         if body.digest != creature.digest:
             write_creature(folder / BODY, body.files)
-        skills = write_skill_runs(folder, creature, examined.champion, examined.certificate)
+        skills = write_skill_runs(folder, examined.champion, examined.certificate)
         write_text(folder / CERTIFICATE, examined.certificate.to_json())
         if examined.beyond:
             write_text(folder / STRESS, examined.beyond.to_json())

@@ -23,17 +23,18 @@ from mjxgait.training.folder import (
 )
 
 
-def write_skill_runs(
-    folder: Path, creature: Creature, champion: Champion, certificate: Certificate
-) -> list[Path]:
+def write_skill_runs(folder: Path, champion: Champion, certificate: Certificate) -> list[Path]:
     """Write `skills/NAME` for each skill of a run's champion, and return these folders.
 
     What an earlier champion left there is replaced, other files stay. A single task has none.
     """
-    made = []
-    for task, one in by_skill(champion).items():
+    made: list[Path] = []
+    if not (skills := by_skill(champion)):
+        return made
+    creature, config = open_run(folder)
+    for task, one in skills.items():
         own = folder / SKILLS / title_of(task)
-        write_setup(own, creature, _config(folder, creature, task))
+        write_setup(own, creature, _single(config, creature, task))
         write_champion(one, creature, own / CHAMPION)
         write_creature(own / BODY, one.embodied(creature).files)
         write_text(own / CERTIFICATE, certificate.skills[task].to_json())
@@ -41,9 +42,8 @@ def write_skill_runs(
     return made
 
 
-def _config(folder: Path, creature: Creature, task: str) -> Config:
-    """Return the run's settings with a single skill as task."""
-    config = open_run(folder)[1]
+def _single(config: Config, creature: Creature, task: str) -> Config:
+    """Return a run's settings with a single skill as task."""
     use = {"controller": config.use.controller, "task": task}
     own = configured(creature, None, use, WalkTargets())
     brain: Any = config.controller
@@ -52,6 +52,6 @@ def _config(folder: Path, creature: Creature, task: str) -> Config:
         own,
         seed=config.seed,
         controller=dataclasses.replace(brain, skill=skills_of(config.use.task).index(task)),
-        fitness=build(type(own.fitness), scores, f"{folder}: fitness.{task}"),
+        fitness=build(type(own.fitness), scores, f"fitness.{task}"),
         rollout=config.rollout,
     )

@@ -111,7 +111,8 @@ class Skills(ModularTask):
     @override
     def params(self, settings: SkillsConfig) -> Any:
         """Of the tasks, by skill."""
-        return tuple(task.params(own) for task, own in self._own(settings))
+        each = zip(self.tasks, self.each, strict=True)
+        return tuple(task.params(getattr(settings, name)) for name, task in each)
 
     @override
     def observations(self, goal: Commanded, sensed: Sensed) -> Mapping[str, jax.Array]:
@@ -186,10 +187,6 @@ class Skills(ModularTask):
     @property
     def _follower(self) -> Following | None:
         return next((task for task in self.each if isinstance(task, Following)), None)
-
-    def _own(self, settings: SkillsConfig) -> list[tuple[ModularTask, Any]]:
-        own = [getattr(settings, name) for name in self.tasks]
-        return list(zip(self.each, own, strict=True))
 
     def _ended(self, stats: SkillsStats) -> list[EpisodeStats]:
         """Return the statistics of the tasks at the end of the episode, which all share."""
