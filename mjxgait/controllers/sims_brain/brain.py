@@ -3,9 +3,10 @@
 A neuron has one number of memory. Inputs are clipped to ±`LOUDEST`, values to ±`MOST`, so that
 nothing overflows.
 
-Letters: `P` parts, `n` links, `K` neurons, `Q` and `M` as in `genotype`; `V` values: nothing (0),
-the constant 1, the angles, contacts and light of all links, and all neurons, part by part, the
-central ones last. A part's contact and light are those of the link that carries its block.
+Letters: `P` parts, `n` links, `K` neurons, `S` skills, `Q` and `M` as in `genotype`; `V` values:
+nothing (0), the constant 1, the angles, contacts and light of all links, and all neurons, part by
+part, the central ones last. A part's contact and light are those of the link that carries its
+block.
 """
 
 import jax
@@ -82,9 +83,9 @@ class Brain:
     """Brain of a body. kind: [P Q + M]. source: [P Q + M, 3] indices of values; weight: likewise.
 
     drive: [S, n] index of the value that drives a link's hinge, by skill. gain: [S, n] its factor.
-    pull: [n] N·m, largest torque (signed). sign: [n] factor from angles to those of the genes. image: [n], -1 in a
-    mirror image. lit: [n] index of the link that observes the light for a hinge. steer: [n, 2, 3]
-    as in `Nerves`; None without.
+    pull: [n] N·m, largest torque (signed). sign: [n] factor from angles to those of the genes.
+    image: [n], -1 in a mirror image. lit: [n] index of the link that observes the light for a
+    hinge. steer: [n, 2, 3] as in `Nerves`; None without.
     """
 
     kind: jax.Array
