@@ -42,6 +42,8 @@ class ModularSensed:
     volume); negative where all are above.
     geom_rot: [G, 3, 3], rows are the own axes of each watched block in the world; only where vision
     needs it.
+    cube: [3] m, middle of the cube of a contest. gaps: [2] m from there to the nearest block of the
+    body and of its opponent. None without one.
     """
 
     com: jax.Array
@@ -50,6 +52,8 @@ class ModularSensed:
     limit_excess: jax.Array
     depth: jax.Array
     geom_rot: jax.Array | None = None
+    cube: jax.Array | None = None
+    gaps: jax.Array | None = None
 
 
 @pytree
