@@ -26,6 +26,7 @@ class ControllerKind:
     home: the slice's package.
     controller: the class that moves bodies in the compiled program, a `Controller`.
     reference: from creature, champion and step (s) to the reference controller in NumPy, a `ReferenceController`.
+    opponent: the same for the body that a creature meets in a contest; None without contests.
     serializer: a `Serializer`; None writes the genome's arrays as they are.
     report: a `GenomeView`; None shows the arrays as they are.
     grows: whether a genome grows its own body.
@@ -36,6 +37,7 @@ class ControllerKind:
     home: str
     controller: Part
     reference: Part
+    opponent: Part = None
     serializer: Part = None
     report: Part = None
     grows: bool = False

@@ -156,8 +156,10 @@ def _numbers(walk: "Walk", out: Path) -> str:
 def _animation(loop: "WalkLoop", character: "Character | None", out: Path, travelling: bool) -> str:
     """Write the loop; return what was written."""
     called = _write(loop, character, out, travelling)
-    strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
     seconds, rate, speed = loop.times[-1], loop.rate, loop.speed
+    if not loop.strides:
+        return f"{called}a contest of {seconds:.2f} s at {rate} frames/s"
+    strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
     return f"{called}{strides}, {seconds:.2f} s at {rate} frames/s, {speed:.2f} m/s"
 
 

@@ -69,7 +69,14 @@ class _Body:
         self.trunk_rot = self.data.xmat[self.trunk.id].reshape(3, 3).copy()
         free = mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL
         joints = map(self.model.joint, range(self.model.njnt))
-        self.joints = [j for j in joints if j.type[0] not in free and j.bodyid[0] != self.trunk.id]
+        self.others = [self.model.body(name).id for name in self.identity.get("beside", ())]
+        self.joints = [
+            j
+            for j in joints
+            if j.type[0] not in free
+            and j.bodyid[0] != self.trunk.id
+            and self.model.body_rootid[j.bodyid[0]] not in self.others
+        ]
         self.names = [j.name for j in self.joints]
         feet = [int(self.model.geom(g).bodyid[0]) for g in self.identity["feet"]]
         if self.table.get("rig", {}).get("bones"):  # its toes are parts, fixed to a foot
@@ -92,7 +99,8 @@ class _Body:
         yield "left axis", creature.frame.left, left
         yield "up axis", creature.frame.up, up
         yield "hip height in m", creature.frame.hip_height, self.hip_height()
-        yield "mass in kg", creature.frame.mass, mujoco.mj_getTotalmass(self.model)
+        theirs = self.model.body_subtreemass[self.others].sum()
+        yield "mass in kg", creature.frame.mass, mujoco.mj_getTotalmass(self.model) - theirs
         yield "number of joints", len(creature.joints.names), len(self.joints)
         yield "feet", list(map(self._body_id, creature.feet.names)), self.feet
         yield "positions' places", creature.joints.qpos_adr, [j.qposadr[0] for j in self.joints]

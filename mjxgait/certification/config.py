@@ -16,6 +16,7 @@ from mjxgait.config.tables import (
 from mjxgait.reference.outcome import Fall
 from mjxgait.tasks.hop.thresholds import HopThresholds, LimboThresholds, TravelThresholds
 from mjxgait.tasks.modular.thresholds import (
+    CompeteThresholds,
     FollowThresholds,
     JumpThresholds,
     RoamThresholds,
@@ -228,6 +229,7 @@ class CertificateConfig:
     roam: RoamThresholds = dataclasses.field(default_factory=RoamThresholds)
     jump: JumpThresholds = dataclasses.field(default_factory=JumpThresholds)
     follow: FollowThresholds = dataclasses.field(default_factory=FollowThresholds)
+    compete: CompeteThresholds = dataclasses.field(default_factory=CompeteThresholds)
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:

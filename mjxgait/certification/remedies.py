@@ -313,6 +313,7 @@ TARGETS = (
 OTHER_TASKS = (
     Entry("speed (m/s)", "It moves at {v:.2f} m/s; {t:.2g} is needed."),
     Entry("speed towards it (m/s)", "It nears the light at {v:.2f} m/s; {t:.2g} is needed."),
+    Entry("share of the cube", "It has {v:.0%} of the cube; {t:.0%} is needed, half is a draw."),
     Entry("height of the lowest part (m)", "It jumps {v:.2f} m high; {t:.2g} is needed."),
     Entry(
         "way / path", "It does not go straight: its way is {v:.0%} of its path; {t:.0%} is needed."

@@ -232,18 +232,27 @@ def off_axis(vectors: np.ndarray, axes: np.ndarray) -> np.ndarray:
 WAY_OUT = "evolution knows one creature on a flat floor and nothing else"
 
 
-def check_world(model: mujoco.MjModel, trunk: int, floor: int) -> None:
+def beside(model: mujoco.MjModel, names: Collection[str]) -> np.ndarray:
+    """Return which bodies [nbody] belong to others than the creature, given the roots' names."""
+    found: np.ndarray = np.isin(model.body_rootid, [model.body(name).id for name in names])
+    return found
+
+
+def check_world(
+    model: mujoco.MjModel, trunk: int, floor: int, beside: Collection[int] = ()
+) -> None:
     """Refuse what evolution would ignore: other moving bodies, and touchable geoms but the floor.
 
     Args:
-      trunk: body id. floor: geom id.
+      trunk: body id. floor: geom id. beside: ids of other bodies that may move, with all on them.
 
     Raises:
       UserError: names the body or geom, and the remedy.
     """
     own = int(model.body_treeid[trunk])
+    known = {own, *(int(model.body_treeid[body]) for body in beside)}
     for body in np.flatnonzero(model.body_treeid >= 0):
-        if own >= 0 and int(model.body_treeid[body]) != own:
+        if own >= 0 and int(model.body_treeid[body]) not in known:
             raise UserError(
                 f'body "{model.body(body).name or body}" moves but is no part of '
                 f'"{model.body(trunk).name}": {WAY_OUT}; '

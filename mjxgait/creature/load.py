@@ -80,10 +80,15 @@ def _assemble(
         for part in parts:
             _id(model, mujoco.mjtObj.mjOBJ_BODY, part, key)
     _check_numbers(model)
-    check_world(model, trunk, _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor"))
+    beside = [
+        _id(model, mujoco.mjtObj.mjOBJ_BODY, name, "creature.beside")
+        for name in settings.creature.beside
+    ]
+    floor = _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor")
+    check_world(model, trunk, floor, beside)
     data = _standing(model, settings.creature.keyframe)
     axes = _trunk_axes(data.xmat[trunk].reshape(3, 3), np.array(settings.creature.forward))
-    found = _actuated(model, trunk)
+    found = _actuated(model, trunk, geometry.beside(model, settings.creature.beside))
     names = [model.joint(j).name for j in found]
     values = _joint_values(settings, names)
     partner, sign = mirrored(model, data, settings, found, axes)
@@ -121,12 +126,14 @@ def _assemble(
     return creature
 
 
-def _actuated(model: mujoco.MjModel, trunk: int) -> list[int]:
-    """Ids of the actuated joints: all hinges and slides but the trunk's."""
+def _actuated(model: mujoco.MjModel, trunk: int, beside: np.ndarray) -> list[int]:
+    """Ids of the actuated joints: all hinges and slides but the trunk's and those of others."""
     joints = [
         j
         for j in range(model.njnt)
-        if model.jnt_type[j] in (HINGE, SLIDE) and model.jnt_bodyid[j] != trunk
+        if model.jnt_type[j] in (HINGE, SLIDE)
+        and model.jnt_bodyid[j] != trunk
+        and not beside[model.jnt_bodyid[j]]
     ]
     if not joints:
         raise UserError("the model has no hinge joint below its trunk, so there is nothing to move")
@@ -182,7 +189,7 @@ def _frame(
         start_axes=(ahead.astype(np.float32), np.cross([0, 0, 1], ahead).astype(np.float32)),
         hip_height=float(geometry.leg_lengths(model, data, feet, joints).mean()),
         body_length=length or geometry.body_length(model, data, rotation @ axes[0]),
-        mass=float(model.body_mass.sum()),
+        mass=float(model.body_mass[~geometry.beside(model, settings.creature.beside)].sum()),
     )
 
 

@@ -36,7 +36,8 @@ class Identity:
     """The names of the parts.
 
     grows: whether it is only a seed, and the simulated bodies grow from genomes. planar: whether it
-    is a body in two dimensions; its limbs pass each other.
+    is a body in two dimensions; its limbs pass each other. beside: bodies that move but are no part
+    of the creature, such as its opponent in a contest.
     """
 
     __pydantic_config__ = STRICT
@@ -50,6 +51,7 @@ class Identity:
     body_length: Positive | None = None
     grows: bool = False
     planar: bool = False
+    beside: tuple[str, ...] = ()
 
 
 @dataclasses.dataclass(frozen=True)

@@ -76,7 +76,17 @@ class Evolution:
         key, key_offspring = jax.random.split(state.key)
         offspring, origin, mothers = self._offspring(key_offspring, state, self._seeding(state))
         born = jnp.full(self.config.offspring, state.generation + 1)
-        return self._with_elite(state, Proposal(key, offspring, origin, born, mothers))
+        proposal = self._with_elite(state, Proposal(key, offspring, origin, born, mothers))
+        return self._with_opponent(state, proposal)
+
+    def _with_opponent(self, state: EvolutionState, proposal: Proposal) -> Proposal:
+        """Let all meet the best of the last generation, where genomes have an opponent."""
+        if self.variation.met is None:
+            return proposal
+        best = jax.tree.map(lambda leaf: leaf[0], state.genomes)
+        met = self.variation.met(proposal.offspring, best)
+        known = choose(state.generation < 0, proposal.offspring, met)
+        return dataclasses.replace(proposal, offspring=known)
 
     def _with_elite(self, state: EvolutionState, proposal: Proposal) -> Proposal:
         """Put the best parents in the first places, to be evaluated once more."""

@@ -39,6 +39,17 @@ def _check_options(creature: Creature, config: Config) -> None:
             f"{name}: rollout.moves moves the lights of followers, and the task {task} has none; leave "
             "it out"
         )
+    if task == "compete" and config.evolution.survival != "children":
+        raise UserError(
+            f"{name}: opponents change in every generation, and with evolution.survival = "
+            f'"{config.evolution.survival}" parents keep what they had against earlier ones; take '
+            "--evolution.survival children"
+        )
+    if task == "compete" and config.evolution.islands.count > 1:
+        raise UserError(
+            f"{name}: each island has its own opponents, so those that migrate would meet another; take "
+            "--evolution.islands.count 1, or --runs for several runs side by side"
+        )
     if config.evolution.family < 1 and config.evolution.islands.count > 1:
         raise UserError(
             f"{name}: evolution.family is for one population, and islands are several as they are; "

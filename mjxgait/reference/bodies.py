@@ -12,6 +12,7 @@ from mujoco.batch import Batch
 
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import posed
+from mjxgait.reference.contest import contest_of
 from mjxgait.reference.layout import (
     Layout,
     LowestPoint,
@@ -124,6 +125,7 @@ class Bodies:
     ) -> None:
         self.creature, self.starts = creature, starts
         self.start, self.terrain = start_frame(creature), terrain_of(creature)
+        self.contest = contest_of(creature)
         self.batch, self.layout = batch_of(creature, model, starts, threads), Layout(model)
         feet, watched = creature.feet, len(creature.feet.foot_of)
         self.solid = LowestPoint(model, colliding_geoms(model), self.terrain)
@@ -211,10 +213,13 @@ class Bodies:
     def light(self, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
         """Return the light's direction [rows, F, 3] in each foot's own axes; empty if unused.
 
-        time: [rows] s.
+        In a contest the cube is the light. time: [rows] s.
         """
         if not self.sees_light:
             return np.zeros((len(rows), 0, 3))
+        if self.contest is not None:
+            poses = self.geom_xpos[rows], self.geom_xmat[rows]
+            return self.contest.to_cube(*poses, self.feet.geoms)
         starts, moved = self.starts, (time >= self.starts.light_time[rows])[:, None]
         light = np.where(moved, starts.moved_light[rows], starts.light[rows])[:, None]
         there = self.start.place + light - self.geom_xpos[rows][:, self.feet.geoms]
@@ -233,6 +238,11 @@ class Bodies:
         """Return the centre of mass [rows, 3] in m from the trunk's start, in world axes."""
         moved: np.ndarray = self.subtree_com[rows, self.creature.trunk] - self.start.place
         return moved
+
+    def gaps(self, rows: np.ndarray) -> np.ndarray:
+        """Return the distances [rows, 2] in m of body and opponent from the cube of a contest."""
+        assert self.contest is not None
+        return self.contest.gaps(self.geom_xpos[rows], self.geom_xmat[rows])
 
     def astray(self, rows: np.ndarray, commanded: np.ndarray) -> np.ndarray:
         """Return the nose's heading less the commanded one, [rows] rad."""

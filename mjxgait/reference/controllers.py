@@ -48,6 +48,14 @@ class ReferenceController(Protocol):
         ...
 
 
+def opponent_of(creature: Creature, champion: Champion, step: float) -> ReferenceController:
+    """Return the controller in NumPy of the opponent that a champion meets. step: s."""
+    made: ReferenceController = controller_kind(champion.controller).part("opponent")(
+        creature, champion, step
+    )
+    return made
+
+
 def reference_of(creature: Creature, champion: Champion, step: float) -> ReferenceController:
     """Return the champion's controller in NumPy. step: s.
 

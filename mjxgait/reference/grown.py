@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
+from mjxgait.reference.contest import contest_of
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -20,6 +21,8 @@ class Grown:
     low: [T] m, lowest point of all blocks. buried: [T] greatest depth of a block in the ground, as
     a share of its size. folded: [T] greatest depth of a block's far end in the block on which it
     turns, as a share of the smaller size. sizes: m by name of the part, cube root of its volume.
+    gaps: [T, 2] m from the cube's middle to the nearest block of the body and of its opponent; NaN
+    without a cube.
     """
 
     middle: np.ndarray
@@ -29,6 +32,7 @@ class Grown:
     buried: np.ndarray
     folded: np.ndarray
     sizes: Mapping[str, float]
+    gaps: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 2)))
 
     def window(self, frames: slice) -> "Grown":
         """Return some of the frames."""
@@ -48,10 +52,11 @@ def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: flo
     instead.
     """
     model, data = creature.model, mujoco.MjData(creature.model)
-    boxes = np.flatnonzero(model.geom_bodyid > 0)
+    boxes = np.flatnonzero(model.body_rootid[model.geom_bodyid] == creature.trunk)
     half, size = model.geom_size[boxes], np.cbrt(8 * model.geom_size[boxes].prod(1))
     middle, momentum, push = (np.full((len(qpos), 3), np.nan) for _ in range(3))
     low, buried, folded = (np.full(len(qpos), np.nan) for _ in range(3))
+    gaps, contest = np.full((len(qpos), 2), np.nan), contest_of(creature)
     joined = _joined(model, boxes)
     velocity = np.zeros(6)
     for k in np.flatnonzero(np.isfinite(qpos).all(1) & np.isfinite(qvel).all(1)):
@@ -68,6 +73,8 @@ def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: flo
         reach = (np.abs(data.geom_xmat[boxes, 6:]) * half).sum(1)
         lows = data.geom_xpos[boxes, 2] - reach
         low[k], buried[k] = lows.min(), (-lows / size).max()
+        if contest is not None:
+            gaps[k] = contest.gaps(data.geom_xpos[None], data.geom_xmat[None])[0]
         ends = _far_ends(data, model, boxes)
         folded[k] = max(
             (_depth(data, model, ends[i], boxes[j]) / min(size[i], size[j]) for i, j in joined),
@@ -76,7 +83,7 @@ def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: flo
     names = [model.body(model.geom_bodyid[box]).name for box in boxes]
     sizes = dict(zip(names, size.tolist(), strict=True))
     buried, folded = np.maximum(buried, 0.0), np.maximum(folded, 0.0)
-    return Grown(middle, momentum, push, low, buried, folded, sizes)
+    return Grown(middle, momentum, push, low, buried, folded, sizes, gaps)
 
 
 def _joined(model: mujoco.MjModel, boxes: np.ndarray) -> list[tuple[int, int]]:

@@ -5,7 +5,7 @@ joints, `nq nv` as in MuJoCo.
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Annotated
 
 import numpy as np
@@ -87,12 +87,13 @@ class Outcome:
     fell: [S] s, infinite without a fall. travel: [S, 3] m forward, left and up from the start until
     the end or the fall.
     clearance: [S] m, least distance to the bar, `layout.FAR` at most; infinite without a bar.
-    The next five have a value after each control step and NaN from the fall on. They are empty if
+    The next six have a value after each control step and NaN from the fall on. They are empty if
     the task does not need them (`path` and `aside` are never empty):
     path, aside: [S, T] m of the trunk forward, and to the left.
     astray: [S, T] rad, heading less the commanded one.
     middle: [S, T, 3] m in world axes, from the trunk's start to the centre of mass.
     low: [S, T] m, lowest solid part above the ground.
+    gaps: [S, T, 2] m of body and opponent from the cube of a contest.
     """
 
     fell: np.ndarray
@@ -104,6 +105,7 @@ class Outcome:
     middle: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
     low: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     aside: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    gaps: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 2)))
 
     @property
     def stayed_up(self) -> np.ndarray:
@@ -113,17 +115,22 @@ class Outcome:
     def copy(self, leader: int, rows: np.ndarray) -> None:
         """Copy the results of one simulation to others that have been identical to it."""
         own = (self.fell, self.travel, self.path, self.aside, self.clearance, self.astray)
-        for values in (*own, self.middle, self.low):
+        for values in (*own, self.middle, self.low, self.gaps):
             values[rows] = values[leader]
 
 
 def blank_outcome(
-    count: int, steps: int, film: Trajectory, *, commanded: bool, middle: bool, low: bool
+    count: int, steps: int, film: Trajectory, *, commanded: bool, kept: Collection[str]
 ) -> Outcome:
     """Return the results of S simulations before their first step.
 
-    commanded: whether they follow a commanded heading. middle, low: whether these are recorded.
+    commanded: whether they follow a commanded heading. kept: which of `middle`, `low` and `gaps`
+    are recorded.
     """
+
+    def blank(name: str, *width: int) -> np.ndarray:
+        return np.full((count, steps if name in kept else 0, *width), np.nan)
+
     return Outcome(
         fell=np.full(count, np.inf),
         travel=np.zeros((count, 3)),
@@ -132,8 +139,9 @@ def blank_outcome(
         clearance=np.full(count, np.inf),
         trajectory=film,
         astray=np.full((count, steps if commanded else 0), np.nan),
-        middle=np.full((count, steps if middle else 0, 3), np.nan),
-        low=np.full((count, steps if low else 0), np.nan),
+        middle=blank("middle", 3),
+        low=blank("low"),
+        gaps=blank("gaps", 2),
     )
 
 

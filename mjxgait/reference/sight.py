@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
+from mjxgait.creature.geometry import beside
 from mjxgait.reference.layout import Clearance, LowestPoint, per_foot
 from mjxgait.reference.stepping import examined_model
 from mjxgait.reference.terrain import terrain_of
@@ -72,7 +73,9 @@ class Sight:
         poses = self.geom_xpos[seen], self.geom_xmat[seen]
         self.foot_height[seen] = per_foot(self.creature, self.reach.heights(*poses))
         arm = self.inertial[seen] - self.middle[seen][:, self.model.body_rootid]
-        speed = np.linalg.norm(_moving(self.spun[seen], arm)[:, 1:], axis=2)
+        own = ~beside(self.model, self.creature.settings.creature.beside)
+        own[0] = False
+        speed = np.linalg.norm(_moving(self.spun[seen], arm)[:, own], axis=2)
         self.body_speed[seen] = speed.max(1)
         self._loads()
         if self.bar is not None and self.over is not None:

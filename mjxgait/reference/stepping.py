@@ -14,7 +14,8 @@ import numpy as np
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.bodies import Bodies, wrapped
-from mjxgait.reference.controllers import ReferenceController, reference_of
+from mjxgait.reference.contest import Opponent
+from mjxgait.reference.controllers import ReferenceController, opponent_of, reference_of
 from mjxgait.reference.layout import Clearance
 from mjxgait.reference.outcome import (
     Fall,
@@ -80,6 +81,10 @@ class Stepping:
         model = examined_model(creature)
         self.bodies = Bodies(creature, model, starts, self.reference.reads, task.drag, threads)
         self.memory = dict(self.reference.init(len(starts)))
+        self.opponent: Opponent | None = None
+        if self.bodies.contest is not None:
+            theirs = opponent_of(creature, champion, step)
+            self.opponent = Opponent(self.bodies.contest, theirs, len(starts))
         self.command = np.zeros_like(starts.stiffness)
         self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
         self.finest = int(starts.refine.max())
@@ -101,8 +106,9 @@ class Stepping:
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         film = blank_film(self.creature, time_step, self.record, steps)
         commanded = heading is not None
-        middle, low = self.task.grown, self.task.leaps
-        seen = blank_outcome(count, steps, film, commanded=commanded, middle=middle, low=low)
+        needed = {"middle": self.task.grown, "low": self.task.leaps, "gaps": bool(self.opponent)}
+        kept = {name for name, is_needed in needed.items() if is_needed}
+        seen = blank_outcome(count, steps, film, commanded=commanded, kept=kept)
         seen.travel[:] = self.bodies.travel(np.arange(count))
         leader, waiting = self._alike(heading)
         running = np.setdiff1d(np.arange(count), waiting)
@@ -150,6 +156,8 @@ class Stepping:
             seen.middle[running, k] = bodies.middle(running)
         if self.task.leaps:
             seen.low[running, k] = bodies.height(running)
+        if self.opponent is not None:
+            seen.gaps[running, k] = bodies.gaps(running)
         down = bodies.down(running, self.fall)
         seen.fell[running[down]] = np.minimum(seen.fell[running[down]], now)
         return down
@@ -173,7 +181,8 @@ class Stepping:
     def _follow(self, rows: np.ndarray, leader: int) -> None:
         """Copy the state of one simulation to others."""
         self.bodies.follow(rows, leader)
-        for state in (self.goal, self.command, *self.memory.values()):
+        theirs = self.opponent.states if self.opponent else ()
+        for state in (self.goal, self.command, *self.memory.values(), *theirs):
             state[rows] = state[leader]
         self.sent[:, rows] = self.sent[:, [leader]]
 
@@ -212,9 +221,19 @@ class Stepping:
         arrived = np.maximum(k - starts.delay[running], 0) % len(self.sent)
         torque = self.sent[arrived, running]
         self.bodies.applied[running[:, None], self.creature.joints.dof_adr] = torque
+        self._oppose(running, k)
         self.bodies.step(running)
         self.bodies.last_force[running] = self.bodies.constraint[running]
         return command, torque
+
+    def _oppose(self, running: np.ndarray, k: int) -> None:
+        """Apply the opponent's torques, if there is one."""
+        if self.opponent is None:
+            return
+        bodies = self.bodies
+        state = bodies.qpos[running], bodies.geom_xpos[running], bodies.geom_xmat[running]
+        torque = self.opponent.torque(running, k, *state)
+        bodies.applied[running[:, None], self.opponent.dofs] = torque
 
     def _act(self, running: np.ndarray, state: State, heading: np.ndarray | None) -> np.ndarray:
         """Return the command [running, J] and advance the reference controller's memory."""

@@ -28,6 +28,9 @@ EYE, WIDEST_EYE = 0.34, 0.46
 """Radius of an eye over the face's mean half size, and over its half width at most."""
 LOOKS_OUT, PUPIL_SIZE = 0.62, 0.58
 """Place of the pupil ahead of the eye's middle, and its radius, in radii of the eye."""
+DARKER = 0.5
+"""Brightness of an opponent."""
+CUBE_COLOUR = (0.98, 0.96, 0.88, 1.0)
 LOOKS_UP = 0.3
 """Worth of a face that looks up, over that of one that looks along the way."""
 DECORATION = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": 1}
@@ -38,14 +41,21 @@ def colour_of(node: int) -> np.ndarray:
     return np.append(PALETTE[node % len(PALETTE)], 1.0)
 
 
-def dress(spec: mujoco.MjSpec, parts: Sequence[Part], eyes: tuple[np.ndarray, np.ndarray]) -> None:
+def dress(
+    spec: mujoco.MjSpec,
+    parts: Sequence[Part],
+    eyes: tuple[np.ndarray, np.ndarray],
+    prefix: str = "",
+) -> None:
     """Colour the blocks of a grown body's specification, and add eyes to its root.
 
-    eyes: normal of their face and their upward axis, unit vectors [3] along the root's axes.
+    An opponent is darker. eyes: normal of their face and their upward axis, unit vectors [3] along
+    the root's axes. prefix: of the names of bodies and blocks.
     """
+    tint = np.array([*[DARKER] * 3, 1.0]) if prefix else np.ones(4)
     for number, part in enumerate(parts):
-        spec.geom(f"block{number}").rgba = colour_of(part.node)
-    root = spec.body("part0")
+        spec.geom(f"{prefix}block{number}").rgba = tint * colour_of(part.node)
+    root = spec.body(f"{prefix}part0")
     out, up = eyes
     side, half = np.abs(np.cross(up, out)), parts[0].half
     wide, high = half @ side, half @ np.abs(up)

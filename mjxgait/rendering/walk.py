@@ -5,6 +5,7 @@ Letters: `T` frames (control steps), `J` joints, `G` geoms, `nq` as in MuJoCo.
 """
 
 import dataclasses
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from mjxgait.certification.acceptance import how_simulated
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
-from mjxgait.controllers.sims_brain.reference_body import grow
+from mjxgait.controllers.sims_brain.reference_body import THEIRS, genes_of_opponent, grow
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.reference.layout import RADIUS, Ground, StartFrame, start_frame
@@ -24,7 +25,7 @@ from mjxgait.reference.measure import Recording, measure, stride_starts
 from mjxgait.reference.outcome import Trajectory
 from mjxgait.reference.starts import Starts, nominal_starts
 from mjxgait.reference.terrain import terrain_of
-from mjxgait.rendering.dress import dress, face_of_eyes
+from mjxgait.rendering.dress import CUBE_COLOUR, dress, face_of_eyes
 from mjxgait.training.folder import CERTIFICATE, command
 
 GEOM = mujoco.mjtGeom
@@ -158,15 +159,24 @@ class Walk:
     def _dressed(self) -> mujoco.MjSpec:
         """The creature's specification; blocks that grew have colours and eyes."""
         spec = mujoco.MjSpec.from_string(self.creature.files["creature.xml"])
-        if self.grown:
-            settings, rot = self.champion.settings, self.body_poses()[1][:, self.creature.trunk]
-            parts = grow(self.champion.genome, settings.parts, settings.links)
-            way = self.trunk_pos[-1] - self.trunk_pos[0]
-            way = way if self.afloat else way * [1, 1, 0]
-            length = float(np.linalg.norm(way))
-            ahead = way / length if length > LEAST_WAY else np.zeros(3)
-            dress(spec, parts, face_of_eyes(parts, rot, ahead))
+        if not self.grown:
+            return spec
+        self._dress(spec, self.champion.genome, "")
+        if theirs := genes_of_opponent(self.champion.genome):
+            self._dress(spec, theirs, THEIRS)
+            spec.geom(self.creature.settings.creature.beside[1]).rgba = CUBE_COLOUR
         return spec
+
+    def _dress(self, spec: mujoco.MjSpec, genome: Mapping[str, np.ndarray], prefix: str) -> None:
+        """Give colours and eyes to the body that grew from a genome."""
+        settings, (places, rots) = self.champion.settings, self.body_poses()
+        root = self.creature.model.body(f"{prefix}part0").id
+        parts = grow(genome, settings.parts, settings.links)
+        way = places[-1, root] - places[0, root]
+        way = way if self.afloat else way * [1, 1, 0]
+        length = float(np.linalg.norm(way))
+        ahead = way / length if length > LEAST_WAY else np.zeros(3)
+        dress(spec, parts, face_of_eyes(parts, rots[:, root], ahead), prefix)
 
     def _goals(self, first: np.ndarray) -> np.ndarray:
         """All goals [goals] of the walk, m ahead of the start."""

@@ -7,13 +7,15 @@ from typing import Any
 import jax.numpy as jnp
 
 from mjxgait.config.schema import Config
-from mjxgait.controllers.sims_brain.controller import capacity_of
+from mjxgait.controllers.sims_brain.controller import OPPONENT, Brains, capacity_of
 from mjxgait.controllers.sims_brain.genotype import Capacity
 from mjxgait.controllers.sims_brain.operators import Genotype
+from mjxgait.controllers.sims_brain.opponent import acting, arena_of
 from mjxgait.controllers.sims_brain.phenotype import anatomy, body_of
 from mjxgait.controllers.sims_brain.reference_body import DRAG, FRICTION, GRAVITY, HARDEST
 from mjxgait.creature import Creature
 from mjxgait.kinds import in_water, skills_of
+from mjxgait.physics.batched_trees.arena import ArenaPlant
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Medium, Surroundings
 from mjxgait.plugins import make_controller, make_task
@@ -41,6 +43,18 @@ class GraphGrowth(Growth[TreePlant, Genotype]):
         rested = plant.rested(tree, qpos)
         qpos = rested if medium is None else jnp.where(medium.wet > 0, qpos, rested)
         return dataclasses.replace(start, qpos=qpos, numbers=tree)
+
+
+@dataclasses.dataclass(frozen=True)
+class ArenaGrowth(Growth[ArenaPlant, Genotype]):
+    """Modular bodies from graphs, each with its opponent."""
+
+    controller: Brains
+
+    def body(self, plant: ArenaPlant, genome: Genotype, start: Starts) -> Starts:
+        """Return the start with the body, its opponent and the cube."""
+        tree, qpos, arena = arena_of(plant.one, self.controller, genome, start.qpos)
+        return dataclasses.replace(start, qpos=qpos, numbers=tree, ground=arena)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -87,4 +101,9 @@ class GrownSpec:
             lit="light" in task.adds,
         )
         plant, growth = TreePlant(around), GraphGrowth(capacity)
-        return assembled(body, step, plant, controller, task, config.rollout, LANES, growth)
+        given = (controller, task, config.rollout, LANES)
+        if OPPONENT not in task.adds:
+            return assembled(body, step, plant, *given, growth)
+        assert isinstance(controller, Brains)
+        arena = ArenaPlant(plant, acting(controller, body), controller.every)
+        return assembled(body, step, arena, *given, ArenaGrowth(controller))

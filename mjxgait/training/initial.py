@@ -71,7 +71,7 @@ def initial_of(source: Path) -> Initial:
     controller = build_experiment(creature, config).simulator.controller
     for observation, names in _genes_of(controller).items():
         if observation not in controller.reads:
-            found = {name: array for name, array in found.items() if name not in names}
+            found = {k: array for k, array in found.items() if not k.startswith(tuple(names))}
     reads = tuple(controller.reads)
     return Initial(source, config.use.controller, reads, _joints(creature), found)
 
@@ -179,7 +179,7 @@ def planted(state: EvolutionState, genomes: Genomes, controller: object = None) 
 
 
 def _genes_of(controller: object) -> Mapping[str, Sequence[str]]:
-    """Return the arrays of a genome that do nothing without an observation.
+    """Return the beginnings of names of a genome's arrays that do nothing without an observation.
 
     Only bodies that grow have some: their tasks differ in what a brain observes.
     """
@@ -189,8 +189,8 @@ def _genes_of(controller: object) -> Mapping[str, Sequence[str]]:
 
 def _without_idle(shapes: Shapes, found: Container[str], controller: object) -> Shapes:
     """Return the shapes without those that are not found and do nothing without an observation."""
-    idle = {name for names in _genes_of(controller).values() for name in names}
-    return {name: shape for name, shape in shapes.items() if name in found or name not in idle}
+    idle = tuple(name for names in _genes_of(controller).values() for name in names)
+    return {k: shape for k, shape in shapes.items() if k in found or not k.startswith(idle)}
 
 
 def _joints(creature: Creature) -> tuple[str, ...]:

@@ -13,11 +13,17 @@ from mjxgait.certification import CertificateConfig
 from mjxgait.certification.acceptance import how_simulated
 from mjxgait.champion import Champion, serializer_of
 from mjxgait.controllers.key_poses.config import gene_names
-from mjxgait.controllers.sims_brain.reference import TICKS, brain_reference
+from mjxgait.controllers.sims_brain.reference import (
+    TICKS,
+    BrainReference,
+    brain_reference,
+    opponent_reference,
+)
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import support_extents
 from mjxgait.errors import UserError
 from mjxgait.reference.bodies import Water
+from mjxgait.reference.contest import contest_of
 from mjxgait.reference.controllers import reference_of
 from mjxgait.reference.layout import FLOOR, start_frame
 from mjxgait.reference.starts import nominal_starts
@@ -70,6 +76,7 @@ def facts_of(creature: Creature, champion: Champion) -> Facts:
         },
         "kind": champion.controller,
         "controller": CONTROLLERS[champion.controller](creature, champion),
+        "opponent": _opponent(creature, champion),
         "every": reference.every,
     }
 
@@ -191,7 +198,26 @@ def _program(creature: Creature, champion: Champion) -> Facts:
 
 
 def _brain(creature: Creature, champion: Champion) -> Facts:
-    brain = brain_reference(creature, champion, float(creature.model.opt.timestep))
+    return _network(brain_reference(creature, champion, float(creature.model.opt.timestep)))
+
+
+def _opponent(creature: Creature, champion: Champion) -> Facts | None:
+    """The opponent of a contest: its brain, hinges and blocks, and the cube; None without one."""
+    contest, model = contest_of(creature), creature.model
+    if contest is None:
+        return None
+    return {
+        "controller": _network(opponent_reference(creature, champion, float(model.opt.timestep))),
+        "joints": {
+            "qpos": model.jnt_qposadr[contest.joints].tolist(),
+            "dofs": model.jnt_dofadr[contest.joints].tolist(),
+        },
+        "parts": _parts(model, contest.geoms[1].tolist()),
+        "cube": contest.cube,
+    }
+
+
+def _network(brain: BrainReference) -> Facts:
     kinds = [""] * len(brain.place)
     for kind, neurons in brain.alike.items():
         for neuron in neurons:

@@ -75,6 +75,11 @@ def build_page(walk: Walk, loop: WalkLoop, verdict: str, sections: str) -> str:
 
 def _lead(walk: Walk, loop: WalkLoop) -> str:
     """The motion in numbers."""
+    if not loop.strides:
+        return (
+            f"A contest of {loop.times[-1]:.0f} s for the cube, which the page repeats. The champion "
+            "is bright, its opponent dark."
+        )
     seconds = loop.times[-1] / loop.strides
     if walk.grown:
         return (

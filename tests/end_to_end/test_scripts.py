@@ -89,6 +89,20 @@ FORMS: dict[str, Given] = {
     "diversity.py": lambda folder: [
         str(trained(folder / "run", "--env", "blocks", *FEW_BLOCKS, *settled_soon("swim")))
     ],
+    "tournament.py": lambda folder: [
+        str(
+            trained(
+                folder / "run",
+                "--env",
+                "blocks",
+                "--task",
+                "compete",
+                *FEW_BLOCKS,
+                *settled_soon("compete"),
+            )
+        ),
+        *("--generations", "1"),
+    ],
     "every_creature.py": lambda folder: [*STOOLS, "--seeds", "7", "--out", "out", "--", *TINY],
     "ground.py": lambda folder: [*STOOLS, "--rounds", "1"],
     "imported.py": lambda folder: [

@@ -57,6 +57,7 @@ TRAINED = {
     "follow-on-land": "tests/tasks/modular/test_roaming.py",
     **dict.fromkeys(("jump", "follow"), "tests/tasks/modular/test_roaming.py"),
     "travel": "tests/tasks/hop/test_travel.py",
+    "compete": "tests/tasks/modular/test_compete.py",
     **dict.fromkeys(("amphibian", "all-trades"), "tests/tasks/modular/test_skills.py"),
 }
 """Tasks that another test evolves, and where.

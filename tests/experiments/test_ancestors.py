@@ -216,7 +216,7 @@ def test_weights_of_a_light_stay_as_drawn_after_a_task_without_one():
         for task in ("swim", "follow")
     )
     swim, follow = (build_experiment(blocks, settings) for settings in (dark, lit))
-    assert swim.simulator.controller.genes_of == {"light": ("nerves.steer",)}
+    assert swim.simulator.controller.genes_of["light"] == ("nerves.steer",)
     state, came = follow.init(), swim.init()
     idle = swim.simulator.controller.genes_of["light"]
     genomes = {n: array for n, array in arrays_of(came.genomes).items() if n not in idle}

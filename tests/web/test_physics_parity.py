@@ -96,6 +96,14 @@ def with_expressions():
     return luxo, champion
 
 
+def two_brains():
+    """A contest of a body with its like."""
+    champion = with_a_brain("follow-on-land")[1]
+    theirs = {f"opponent.{name}": array for name, array in champion.genome.items()}
+    contest = dataclasses.replace(champion, task="compete", genome=champion.genome | theirs)
+    return contest.embodied(load_creature(data_folder("envs") / "blocks")), contest
+
+
 CASES = {
     # name: creature and champion, s, disturbances, push
     "evolved": lambda stool: (*open_champion(WALK), 5.0, None, None),
@@ -106,6 +114,7 @@ CASES = {
     "falls": lambda stool: (stool, falling(stool), 1.0, None, None),
     "expressions": lambda stool: (*with_expressions(), 1.5, None, None),
     "a brain on land": lambda stool: (*with_a_brain("follow-on-land"), 2.0, DISTURBED, None),
+    "two brains at a cube": lambda stool: (*two_brains(), 1.0, DISTURBED, None),
     "a brain in water": lambda stool: (*with_a_brain("follow"), 2.0, None, PUSH),
 }
 
@@ -156,7 +165,7 @@ def test_the_comparison_can_fail(stool, walked):
     assert np.isfinite(walked["falls"][1][2])
     assert np.isinf(walked["evolved"][1][2])
     assert np.ptp(walked["expressions"][1][1], axis=0).min() > 0.01
-    for name in ("a brain on land", "a brain in water"):
+    for name in ("a brain on land", "two brains at a cube", "a brain in water"):
         assert np.abs(walked[name][1][1]).max() > 0.01, "N·m"
     for name, change in {
         "by the clock": {"wish": {}},

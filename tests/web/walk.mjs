@@ -15,7 +15,8 @@ const CONTROLLERS = { poses: KeyPoses, program: Expressions, brain: Brain };
 function walk({ facts, steps, disturbed, push }) {
   const controller = new CONTROLLERS[facts.kind](facts.controller);
   const water = facts.water && new Water(facts.water);
-  const simulation = new Simulation(mujoco, facts, controller, water);
+  const opponent = facts.opponent && new CONTROLLERS[facts.kind](facts.opponent.controller);
+  const simulation = new Simulation(mujoco, facts, controller, water, opponent);
   if (disturbed) {
     simulation.setMass(disturbed.mass);
     simulation.setFriction(disturbed.friction);

@@ -57,13 +57,15 @@ class WalkLoop:
 
 
 def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
-    """The steadiest strides of a walk as a loop of whole frames.
+    """The steadiest strides of a walk as a loop of whole frames; of a contest the whole of it.
 
     most: largest number of strides; with one, frames may be off the recorded times by half a frame.
 
     Raises:
       UserError: the walk has no steady stride.
     """
+    if walk.creature.settings.creature.beside:
+        return _contest(walk, rate)
     chosen = _alike(walk, rate) if walk.grown else _fitting_strides(walk, rate, most)
     if chosen is None:
         why = (
@@ -101,6 +103,17 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
     return WalkLoop(
         walk, qpos, rate, strides, advance, stretched, (first, last), turned, climb=climb
     )
+
+
+def _contest(walk: Walk, rate: int) -> WalkLoop:
+    """A contest as recorded, about the place of the cube at the start."""
+    model, cube = walk.creature.model, walk.creature.settings.creature.beside[1]
+    count = max(int(walk.seconds * rate), 2)
+    qpos = resampled(model, walk.qpos, np.arange(count) / rate / walk.time_step)
+    middle = walk.qpos[0, model.joint(cube).qposadr[0] :][:2]
+    for place in model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]:
+        qpos[:, place : place + 2] -= middle
+    return WalkLoop(walk, qpos, rate, 0, 0.0, 1.0, (0, len(walk.qpos) - 1))
 
 
 def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:

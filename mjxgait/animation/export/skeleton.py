@@ -33,11 +33,12 @@ class Skeleton:
 
 
 def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
-    """The bodies of the trunk's tree with their own axes, below a root that stays on the floor."""
-    bodies = [
-        0,
-        *(b for b in range(1, model.nbody) if model.body_rootid[b] == model.body_rootid[trunk]),
-    ]
+    """The bodies of the trunk's tree with their own axes, below a root that stays on the floor.
+
+    So are other moving bodies, if there are any: an opponent, and a cube.
+    """
+    own = (model.body_rootid == model.body_rootid[trunk]) | (model.body_treeid >= 0)
+    bodies = [0, *(int(b) for b in np.flatnonzero(own))]
     parents = (-1, *(bodies.index(int(model.body_parentid[b])) for b in bodies[1:]))
     names = ("root", *(model.body(b).name or f"body_{b}" for b in bodies[1:]))
     count = len(bodies)

@@ -8,6 +8,7 @@ KINDS = (
         home=__name__,
         controller="controller:Brains",
         reference="reference:brain_reference",
+        opponent="reference:opponent_reference",
         serializer="serialize:GraphSerializer",
         report="report:GraphView",
         grows=True,

@@ -18,10 +18,11 @@ from mjxgait.controllers.sims_brain.operators import Genotype, Kin, Rates
 from mjxgait.controllers.sims_brain.phenotype import body_of
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.creature.body import Body
+from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Variation
-from mjxgait.types import Tree, choose
+from mjxgait.types import Sensed, Tree, choose
 
-LIGHT, SKILL = "light", "skill"
+LIGHT, SKILL, OPPONENT = "light", "skill", "opponent"
 
 
 def capacity_of(settings: BrainConfig) -> Capacity:
@@ -37,8 +38,12 @@ class Brains:
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
-    genes_of: ClassVar[Mapping[str, Sequence[str]]] = {LIGHT: ("nerves.steer",)}
-    """Arrays of a genome, by dotted name, that do nothing without an observation."""
+    genes_of: ClassVar[Mapping[str, Sequence[str]]] = {
+        LIGHT: ("nerves.steer",),
+        OPPONENT: ("opponent.",),
+    }
+    """Arrays of a genome that do nothing without an observation, by the beginning of their dotted
+    names."""
 
     @classmethod
     def with_settings(
@@ -52,7 +57,8 @@ class Brains:
         self.pause = step * settings.every
         self.room = NerveRoom(settings.local, settings.central, settings.steer, settings.skills)
         self.skill = settings.skill
-        self.reads = ("joint_pos", "contact", *(name for name in (LIGHT, SKILL) if name in added))
+        known = (LIGHT, SKILL, OPPONENT)
+        self.reads = ("joint_pos", "contact", *(name for name in known if name in added))
 
     def variation(self, settings: BrainConfig, evolution: EvolutionConfig) -> Variation:
         """Offspring are crossed, grafted, or have one parent."""
@@ -88,7 +94,8 @@ class Brains:
         def kept(child: Genotype, mother: Genotype) -> Genotype:
             return _restricted(settings.evolves, child, mother)
 
-        return Variation(create, cross, mutate)
+        usual = Variation(create, cross, mutate)
+        return opposed(usual) if OPPONENT in self.reads else usual
 
     def genes(self, genomes: Genotype, settings: BrainConfig) -> np.ndarray:
         """Kinds, flags and numbers as they are, in no common unit."""
@@ -126,6 +133,44 @@ class Brains:
         skill = senses[SKILL] if SKILL in self.reads else self.skill
         torque, memory = thought(plan, memory, perceived, self.pause, skill)
         return torque[1:], memory
+
+
+def opposed(usual: Variation[Genotype]) -> Variation[Genotype]:
+    """Return the operators for genotypes with an opponent; of the first it is one and the same."""
+
+    def create(key: jax.Array, count: int) -> Genotype:
+        first = jax.tree.map(lambda leaf: leaf[0], usual.create(key_of(0), 1))
+        return met(usual.create(key, count), first)
+
+    def cross(key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
+        child = usual.cross(key, alone(mother), alone(father))
+        return dataclasses.replace(child, opponent=mother.opponent)
+
+    def mutate(key: jax.Array, genotype: Genotype) -> Genotype:
+        return dataclasses.replace(usual.mutate(key, alone(genotype)), opponent=genotype.opponent)
+
+    def met(genotypes: Genotype, best: Genotype) -> Genotype:
+        count = len(jax.tree.leaves(genotypes)[0])
+        spread = jax.tree.map(
+            lambda leaf: jnp.broadcast_to(leaf, (count, *leaf.shape)), alone(best)
+        )
+        return dataclasses.replace(genotypes, opponent=spread)
+
+    return Variation(create, cross, mutate, met=met)
+
+
+def alone(genotype: Genotype) -> Genotype:
+    """Return a genotype without its opponent."""
+    return dataclasses.replace(genotype, opponent=None)
+
+
+def directions(place: jax.Array, sensed: Sensed) -> jax.Array:
+    """Return the directions [G, 3] of a place [3] in the axes of each block."""
+    axes = sensed.body.geom_rot
+    assert axes is not None
+    there = place - sensed.geom_pos
+    there = there / jnp.sqrt(jnp.sum(there**2, axis=1, keepdims=True))
+    return jnp.sum(axes * there[:, None], axis=2)
 
 
 def _restricted(evolves: str | Choice, child: Genotype, mother: Genotype) -> Genotype:

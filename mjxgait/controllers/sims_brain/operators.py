@@ -30,11 +30,15 @@ from mjxgait.types import choose, pytree
 
 @pytree
 class Genotype:
-    """Genotype of a creature: the body's graph, the nodes' nerves, and the central neurons."""
+    """Genotype of a creature: the body's graph, the nodes' nerves, and the central neurons.
+
+    opponent: genotype of the creature that it meets; None where it meets none.
+    """
 
     graph: Graph
     nerves: Nerves
     centre: Centre
+    opponent: "Genotype | None" = None
 
 
 @dataclasses.dataclass(frozen=True)

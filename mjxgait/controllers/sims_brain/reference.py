@@ -10,7 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mjxgait.champion import Champion
-from mjxgait.controllers.sims_brain.reference_body import NEURONS, SENSORS, Part, grow
+from mjxgait.controllers.sims_brain.reference_body import (
+    NEURONS,
+    SENSORS,
+    THEIRS,
+    Part,
+    genes_of_opponent,
+    grow,
+)
 from mjxgait.creature import Creature
 from mjxgait.reference.controllers import Command, Memory
 
@@ -125,11 +132,12 @@ class BrainReference:
         self.column = np.array([[column for column, _ in three] for three in wires])
         self.weight = np.array([[weight for _, weight in three] for three in wires])
         pulls = [self._pull(part, hinge) for part, hinge in self.hinges]
-        self.driver = np.array([column for column, _, _ in pulls])
+        self.driver = np.array([column for column, _, _ in pulls], int)
         self.gain = np.array([gain for _, gain, _ in pulls])
         self.strength = np.array([strength for _, _, strength in pulls])
         lights = [[self._sensor(part, axis) for axis in LIGHT] for part, _ in self.hinges]
-        self.lit = np.array([[column for column, _ in three] for three in lights], int)
+        columns = np.array([[column for column, _ in three] for three in lights], int)
+        self.lit = columns.reshape(-1, 3)
         flips = np.array([[flip for _, flip in three] for three in lights])
         self.steer = self._steer(flips)
 
@@ -239,8 +247,22 @@ def _sign(part: Part, hinge: int) -> float:
 
 def brain_reference(creature: Creature, champion: Champion, step: float) -> BrainReference:
     """Return the brain of a champion; its grown creature names its hinges like `part3_0`."""
-    parts = grow(champion.genome, champion.settings.parts, champion.settings.links)
-    names = [name.removeprefix("part").split("_") for name in creature.joints.names]
-    hinges = [(int(part), int(hinge)) for part, hinge in names]
-    settings = champion.settings
-    return BrainReference(champion.genome, parts, hinges, step, settings.every, settings.skill)
+    return _reference(champion.genome, champion.settings, creature.joints.names, step)
+
+
+def opponent_reference(creature: Creature, champion: Champion, step: float) -> BrainReference:
+    """Return the brain of a champion's opponent, in the order of its hinges in the model."""
+    model = creature.model
+    names = [model.joint(j).name for j in range(model.njnt)]
+    theirs = [n.removeprefix(THEIRS) for n in names if n.startswith(f"{THEIRS}part")]
+    return _reference(genes_of_opponent(champion.genome), champion.settings, theirs, step)
+
+
+def _reference(
+    genome: Mapping[str, np.ndarray], settings: Any, names: Sequence[str], step: float
+) -> BrainReference:
+    """Return a brain. settings: of the controller. names: of its hinges."""
+    parts = grow(genome, settings.parts, settings.links)
+    numbers = [name.removeprefix("part").split("_") for name in names]
+    hinges = [(int(part), int(hinge)) for part, hinge in numbers]
+    return BrainReference(genome, parts, hinges, step, settings.every, settings.skill)

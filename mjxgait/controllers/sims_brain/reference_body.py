@@ -47,6 +47,12 @@ IN_LIGHT = ("follow", "follow-on-land")
 """Tasks with a light; without one its observations are zero."""
 LIGHT = 10.0
 """m from a creature to its light: too far to be reached."""
+CUBE, CUBE_DENSITY = 0.25, 500.0
+"""m and kg/m³: side and density of the cube of a contest."""
+THEIRS = "opponent_"
+"""Beginning of the names of the opponent's bodies, joints and geoms in a model."""
+DISTANCE = 0.8
+"""m between the cube and each of two opponents at the start; see `reach`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,6 +156,22 @@ def grow(genome: Mapping[str, np.ndarray], most_parts: int, most_links: int) -> 
             links += needed
             parts += children
     return parts
+
+
+def reach(parts: Sequence[Part]) -> float:
+    """Return the largest sum in m of x and height over the corners of a body at rest.
+
+    A plane at 45° over the body, that leans towards it, meets the ground there; opponents start
+    with this plane at `DISTANCE` from the cube, so a tall body gains nothing by falling.
+    """
+    corners = np.concatenate([part.box.corners for part in parts])
+    return float((corners[:, 0] + corners[:, 2]).max() - corners[:, 2].min())
+
+
+def genes_of_opponent(genome: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the arrays of the opponent's own genome; empty without one."""
+    start = "opponent."
+    return {name.removeprefix(start): a for name, a in genome.items() if name.startswith(start)}
 
 
 def _crowded(parts: Sequence[Part], children: Sequence[Part], parent: int) -> bool:

@@ -9,7 +9,12 @@ from typing_extensions import override
 from mjxgait.champion.serializers import PlainSerializer
 from mjxgait.config.tables import build
 from mjxgait.controllers.sims_brain.config import BrainConfig
-from mjxgait.controllers.sims_brain.reference_body import FRICTION, GRAVITY, grow
+from mjxgait.controllers.sims_brain.reference_body import (
+    FRICTION,
+    GRAVITY,
+    genes_of_opponent,
+    grow,
+)
 from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
@@ -54,8 +59,8 @@ class GraphSerializer(PlainSerializer[BrainConfig]):
         task: str,
         creature: Creature,
     ) -> Creature:
-        """The grown body, in the water or on the ground of its task."""
-        wet = in_water(task)
+        """The grown body, in the water or on the ground of its task, with its opponent if any."""
+        wet, theirs = in_water(task), genes_of_opponent(genome)
         files = body_files(
             grow(genome, settings.parts, settings.links),
             creature.name,
@@ -63,5 +68,6 @@ class GraphSerializer(PlainSerializer[BrainConfig]):
             gravity=0.0 if wet else GRAVITY,
             friction=None if wet else FRICTION,
             around="in water" if wet else "on land",
+            opponent=grow(theirs, settings.parts, settings.links) if theirs else (),
         )
         return load_files(files)

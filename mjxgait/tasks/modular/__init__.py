@@ -45,6 +45,13 @@ KINDS = (
         what="follow a light on land; for bodies that grow",
     ),
     _kind(
+        "compete",
+        task="compete:Compete",
+        criteria="compete_criteria:CompeteCriteria",
+        tables=("roam", "compete"),
+        what="be nearer to a cube than an opponent; for bodies that grow",
+    ),
+    _kind(
         "amphibian",
         task="skills:Amphibian",
         criteria="skills_criteria:amphibian",

@@ -125,6 +125,40 @@ class JumpConfig(ModularConfig):
 
 
 @dataclasses.dataclass(frozen=True)
+class CompeteWeights:
+    """Weight of each term; all but `share` are penalties.
+
+    Attributes:
+      share: opponent's distance from the cube over the sum of both distances, mean over the time
+        that counts.
+      overlap: part of the share lost by blocks in each other or in the ground.
+      vibration: part of the rest lost by joints that vibrate.
+    """
+
+    __pydantic_config__ = STRICT
+    share: NonNegative = 1.0
+    overlap: NonNegative = 1.0
+    vibration: NonNegative = 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class CompeteConfig(ModularConfig):
+    """Parameters of the compete fitness.
+
+    Attributes:
+      settle: s from the start that do not count: the way to the cube.
+      vibration: change of the joints' speeds from step to step at which half of the share counts,
+        as of walkers.
+      weights: weight of each term.
+    """
+
+    __pydantic_config__ = STRICT
+    settle: NonNegative = 6.0
+    vibration: Positive = 0.8
+    weights: CompeteWeights = dataclasses.field(default_factory=CompeteWeights)
+
+
+@dataclasses.dataclass(frozen=True)
 class RoamSkillWeights(RoamWeights):
     """Weights of walking as one of several skills: fast walkers vibrate.
 

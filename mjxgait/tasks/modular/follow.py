@@ -14,9 +14,10 @@ import numpy as np
 from typing_extensions import override
 
 from mjxgait.config.schema import RolloutConfig
+from mjxgait.controllers.sims_brain.controller import directions
 from mjxgait.controllers.sims_brain.reference_body import LIGHT
 from mjxgait.creature import Creature
-from mjxgait.tasks.modular.base import LocomotionTask, length, own
+from mjxgait.tasks.modular.base import LocomotionTask, length
 from mjxgait.tasks.modular.roam import Roam
 from mjxgait.tasks.modular.swim import Swim
 from mjxgait.tasks.starts import NEVER, Starts
@@ -76,11 +77,7 @@ class Following(LocomotionTask):
 
     def observations(self, goal: Light, sensed: Sensed) -> Mapping[str, jax.Array]:
         """Direction [G, 3] of the light in the axes of each block."""
-        axes = own(sensed).geom_rot
-        assert axes is not None
-        there = goal.place - sensed.geom_pos
-        there = there / jnp.sqrt(jnp.sum(there**2, axis=1, keepdims=True))
-        return {"light": jnp.sum(axes * there[:, None], axis=2)}
+        return {"light": directions(goal.place, sensed)}
 
     @override
     def update(

@@ -87,6 +87,21 @@ class RoamThresholds(GoingThresholds):
 
 
 @dataclasses.dataclass(frozen=True)
+class CompeteThresholds(BlocksThresholds):
+    """Thresholds for `compete`.
+
+    Attributes:
+      share: least mean of the opponent's distance from the cube over the sum of both distances;
+        0.5 is a draw.
+      arrive: share of the perturbed starts that must be won.
+    """
+
+    __pydantic_config__ = STRICT
+    share: Fraction = 0.6
+    arrive: Fraction = 0.75
+
+
+@dataclasses.dataclass(frozen=True)
 class FollowThresholds(BlocksThresholds):
     """Additional thresholds for `follow`, on top of those for `swim` or `roam`.
 

@@ -27,7 +27,8 @@ async function start() {
   const mujoco = await loadMujoco({ wasmBinary: await unpacked("engine") });
   const controller = new CONTROLLERS[facts.kind](facts.controller);
   const water = facts.water && new Water(facts.water);
-  const simulation = new Simulation(mujoco, facts, controller, water);
+  const opponent = facts.opponent && new CONTROLLERS[facts.kind](facts.opponent.controller);
+  const simulation = new Simulation(mujoco, facts, controller, water, opponent);
   showControls(facts);
   const view = new View(viewer, element("overlay"), page);
   const state = {

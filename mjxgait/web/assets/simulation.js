@@ -23,9 +23,9 @@ const CONTACT_GAP = 0.002;
 
 export class Simulation {
   // facts: of mjxgait/web/facts.py. controller: has `init` and `act`, as in key_poses.js. water: has
-  // `press`, as in water.js; null on land.
-  constructor(mujoco, facts, controller, water = null) {
-    Object.assign(this, { mujoco, facts, controller, water });
+  // `press`, as in water.js; null on land. opponent: the controller of `facts.opponent`; null without.
+  constructor(mujoco, facts, controller, water = null, opponent = null) {
+    Object.assign(this, { mujoco, facts, controller, water, opponent });
     this.model = mujoco.MjModel.from_xml_string(facts.xml);
     for (const [name, value] of Object.entries(facts.options)) this.model.opt[name] = value;
     this.data = new mujoco.MjData(this.model);
@@ -57,6 +57,7 @@ export class Simulation {
     this.forces = new Float64Array(model.nv);
     this.memory = this.controller.init();
     this.target = null;
+    this.theirs = this.opponent && { memory: this.opponent.init(), target: [] };
     this.renew();
   }
 
@@ -119,6 +120,7 @@ export class Simulation {
     facts.joints.dofs.forEach((dof, j) => {
       applied[dof] = torque[j];
     });
+    if (this.opponent) this.oppose();
     data.xfrc_applied.fill(0);
     this.water?.press(this);
     this.applyPull();
@@ -128,6 +130,21 @@ export class Simulation {
     this.steps += 1;
     if (this.turn !== null) this.heading += this.turn * facts.step;
     if (this.fell === Infinity && this.isDown()) this.fell = this.time;
+  }
+
+  // Let the opponent of a contest act on its own hinges.
+  oppose() {
+    const { qpos, qfrc_applied } = this.data,
+      { joints, parts } = this.facts.opponent;
+    if (this.steps % this.facts.every === 0)
+      this.theirs = this.opponent.act(this.theirs.memory, {
+        joint_pos: joints.qpos.map(adr => qpos[adr]),
+        contact: parts.map(part => (this.height(part) < CONTACT_GAP ? 1 : 0)),
+        light: parts.map(({ geom }) => this.towardsLight(geom)),
+      });
+    joints.dofs.forEach((dof, j) => {
+      qfrc_applied[dof] = this.theirs.target[j];
+    });
   }
 
   // Observations of the controller, by their names in the documentation.
@@ -222,11 +239,12 @@ export class Simulation {
     this.light = this.light.map((value, i) => value + moved[i]);
   }
 
-  // Direction [3] of the light in a geom's own axes; zero in the dark.
+  // Direction [3] of the light in a geom's own axes; zero in the dark. In a contest it is the cube.
   towardsLight(geom) {
-    const { data } = this;
-    if (!this.light) return [0, 0, 0];
-    const there = minus(this.lightPlace(), three(data.geom_xpos, geom)),
+    const { data, facts } = this,
+      place = facts.opponent ? three(data.geom_xpos, facts.opponent.cube) : this.lightPlace();
+    if (!place) return [0, 0, 0];
+    const there = minus(place, three(data.geom_xpos, geom)),
       far = Math.max(Math.hypot(...there), 1e-9),
       rot = data.geom_xmat.slice(9 * geom, 9 * geom + 9);
     return [0, 1, 2].map(
