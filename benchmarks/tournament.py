@@ -39,7 +39,9 @@ def main() -> None:
         known[run.name] = open_champion(run)[1]
     print("", *range(1, len(known) + 1), "mean", sep=" | ")
     for number, (name, one) in enumerate(known.items(), start=1):
-        shares = [np.nan if other is one else share(creature, one, other) for other in known.values()]
+        shares = [
+            np.nan if other is one else share(creature, one, other) for other in known.values()
+        ]
         shown = ["" if np.isnan(found) else f"{found:.2f}" for found in shares]
         print(f"{number}: {name}", *shown, f"{np.nanmean(shares):.2f}", sep=" | ", flush=True)
 

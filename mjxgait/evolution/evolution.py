@@ -35,12 +35,13 @@ class Evolution:
     """Algorithm and its operators around the simulation: `propose`, then `absorb` the results.
 
     config: plain or traced. rank: terms [..., R, F], generation [] -> fitness [...], higher is
-    better.
+    better. hold: generations with the same opponent, where genomes have one.
     """
 
     config: EvolutionConfig
     variation: Variation
     rank: Callable[[jax.Array, jax.Array], jax.Array]
+    hold: jax.Array | int = 1
 
     def init(self, key: jax.Array, trials: int, terms: int, outcomes: int) -> EvolutionState:
         """Return the state before any evaluation. trials, terms, outcomes: R, F, O."""
@@ -80,13 +81,16 @@ class Evolution:
         return self._with_opponent(state, proposal)
 
     def _with_opponent(self, state: EvolutionState, proposal: Proposal) -> Proposal:
-        """Let all meet the best of the last generation, where genomes have an opponent."""
+        """Let all meet the same opponent, where genomes have one.
+
+        After the first generation, and then every `hold`, it is the best of the last one.
+        """
         if self.variation.met is None:
             return proposal
         best = jax.tree.map(lambda leaf: leaf[0], state.genomes)
-        met = self.variation.met(proposal.offspring, best)
-        known = choose(state.generation < 0, proposal.offspring, met)
-        return dataclasses.replace(proposal, offspring=known)
+        changes = (state.generation >= 0) & (state.generation % self.hold == 0)
+        met = self.variation.met(proposal.offspring, best, changes)
+        return dataclasses.replace(proposal, offspring=met)
 
     def _with_elite(self, state: EvolutionState, proposal: Proposal) -> Proposal:
         """Put the best parents in the first places, to be evaluated once more."""

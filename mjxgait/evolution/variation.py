@@ -45,8 +45,9 @@ class Variation(Generic[Genome]):
     box: bounds of genomes of bounded reals; None: the genomes are of another kind.
     project: genomes [..., ...] -> those with the relations among genes that every new genome has.
     `create` and `mutate` apply it themselves, a drawn distribution does not.
-    met: genomes [M, ...], the best genome so far -> the same genomes, which now meet that one as
-    their opponent; None where genomes have no opponent.
+    met: genomes [M, ...], the best genome of the last generation, whether [] opponents change now
+    -> the same genomes, whose opponent is that one, or else its own opponent; None where genomes
+    have no opponent.
     """
 
     create: Callable[[jax.Array, int], Genome]
@@ -57,7 +58,7 @@ class Variation(Generic[Genome]):
     first: Genome | None = None
     box: Box | None = None
     project: Callable[[Genome], Genome] = _unchanged
-    met: Callable[[Genome, Genome], Genome] | None = None
+    met: Callable[[Genome, Genome, jax.Array], Genome] | None = None
 
     def begin(self, key: jax.Array, count: int) -> Genome:
         """Return genomes [count, ...] of the first generation: `first`, the rest created."""

@@ -17,6 +17,8 @@ def check_fit(creature: Creature, config: Config) -> None:
       UserError: gives the reason and a remedy.
     """
     _check_options(creature, config)
+    if config.use.task == "compete":
+        _check_contest(creature.name, config)
     if config.use.controller == "program":
         check_programs(creature, config)
     if creature.settings.creature.grows:
@@ -39,17 +41,6 @@ def _check_options(creature: Creature, config: Config) -> None:
             f"{name}: rollout.moves moves the lights of followers, and the task {task} has none; leave "
             "it out"
         )
-    if task == "compete" and config.evolution.survival != "children":
-        raise UserError(
-            f"{name}: opponents change in every generation, and with evolution.survival = "
-            f'"{config.evolution.survival}" parents keep what they had against earlier ones; take '
-            "--evolution.survival children"
-        )
-    if task == "compete" and config.evolution.islands.count > 1:
-        raise UserError(
-            f"{name}: each island has its own opponents, so those that migrate would meet another; take "
-            "--evolution.islands.count 1, or --runs for several runs side by side"
-        )
     if config.evolution.family < 1 and config.evolution.islands.count > 1:
         raise UserError(
             f"{name}: evolution.family is for one population, and islands are several as they are; "
@@ -67,6 +58,27 @@ def _check_options(creature: Creature, config: Config) -> None:
                 f"controller.around has {len(around)} angles; {config.controller.key_poses} key poses "
                 f"of {name} have {wanted}; --gait auto begins with no poses that were drawn"
             )
+
+
+def _check_contest(name: str, config: Config) -> None:
+    """Refuse settings under which results against different opponents are compared."""
+    if config.evolution.survival != "children":
+        raise UserError(
+            f"{name}: opponents change in every generation, and with evolution.survival = "
+            f'"{config.evolution.survival}" parents keep what they had against earlier ones; take '
+            "--evolution.survival children"
+        )
+    if not config.evolution.elites:
+        raise UserError(
+            f"{name}: opponents change in every generation, and with evolution.elite = "
+            f"{config.evolution.elite:g} the best parent is not evaluated again; take "
+            "--evolution.elite 0.25"
+        )
+    if config.evolution.islands.count > 1:
+        raise UserError(
+            f"{name}: each island has its own opponents, so those that migrate would meet another; take "
+            "--evolution.islands.count 1, or --runs for several runs side by side"
+        )
 
 
 def _check_given(creature: Creature, config: Config) -> None:

@@ -140,7 +140,7 @@ def opposed(usual: Variation[Genotype]) -> Variation[Genotype]:
 
     def create(key: jax.Array, count: int) -> Genotype:
         first = jax.tree.map(lambda leaf: leaf[0], usual.create(key_of(0), 1))
-        return met(usual.create(key, count), first)
+        return _facing(usual.create(key, count), first)
 
     def cross(key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
         child = usual.cross(key, alone(mother), alone(father))
@@ -149,14 +149,18 @@ def opposed(usual: Variation[Genotype]) -> Variation[Genotype]:
     def mutate(key: jax.Array, genotype: Genotype) -> Genotype:
         return dataclasses.replace(usual.mutate(key, alone(genotype)), opponent=genotype.opponent)
 
-    def met(genotypes: Genotype, best: Genotype) -> Genotype:
-        count = len(jax.tree.leaves(genotypes)[0])
-        spread = jax.tree.map(
-            lambda leaf: jnp.broadcast_to(leaf, (count, *leaf.shape)), alone(best)
-        )
-        return dataclasses.replace(genotypes, opponent=spread)
+    def met(genotypes: Genotype, best: Genotype, changes: jax.Array) -> Genotype:
+        assert best.opponent is not None
+        return _facing(genotypes, choose(changes, alone(best), best.opponent))
 
     return Variation(create, cross, mutate, met=met)
+
+
+def _facing(genotypes: Genotype, opponent: Genotype) -> Genotype:
+    """Return genotypes [M, ...] that all meet one opponent."""
+    count = len(jax.tree.leaves(genotypes)[0])
+    spread = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (count, *leaf.shape)), opponent)
+    return dataclasses.replace(genotypes, opponent=spread)
 
 
 def alone(genotype: Genotype) -> Genotype:

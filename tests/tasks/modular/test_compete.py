@@ -40,7 +40,7 @@ SECONDS, COUNT = 1.6, 60
 TABLE: dict[str, Any] = {
     "use": {"controller": "brain", "task": "compete"},
     "controller": {"nodes": 3, "parts": 3, "links": 3, "local": 2, "central": 1},
-    "evolution": {"population": COUNT, "survival": "children"},
+    "evolution": {"population": COUNT, "survival": "children", "elite": 0.25},
     "seed": 1,
     "rollout": {"seconds": SECONDS, "starts": 1, "promote": 1.0, "lanes": 24},
     "fitness": {"settle": 0.0},
@@ -75,7 +75,8 @@ def met(experiment: Experiment, genomes: Any, place: int) -> Any:
     config = experiment.config
     variation = experiment.simulator.controller.variation(config.controller, config.evolution)
     assert variation.met is not None
-    return variation.met(genomes, jax.tree.map(lambda leaf: leaf[place], genomes))
+    best = jax.tree.map(lambda leaf: leaf[place], genomes)
+    return variation.met(genomes, best, jnp.ones((), bool))
 
 
 def champion_of(experiment: Experiment, genomes: Any, place: int) -> Champion:
@@ -99,14 +100,21 @@ def alike(one: Any, other: Any) -> bool:
     return all(np.array_equal(a, b) for a, b in pairs)
 
 
-@pytest.mark.parametrize("generation", [-1, 0, 7])
-def test_all_meet_the_best_of_the_generation_before(experiment: Experiment, generation: int):
+@pytest.mark.parametrize(
+    ("generation", "changes"), [(-1, False), (0, True), (1, False), (6, True)]
+)
+def test_all_meet_the_best_of_the_generation_before(
+    experiment: Experiment, generation: int, changes: bool
+):
+    """Every three generations; in between the opponent stays, for those too that are drawn anew."""
     state = experiment.init()
     best = jax.tree.map(lambda leaf: leaf[0], state.genomes)
-    expected = best.opponent if generation < 0 else dataclasses.replace(best, opponent=None)
+    expected = dataclasses.replace(best, opponent=None) if changes else best.opponent
     count = COUNT * (generation >= 0)
     known = dataclasses.replace(state, generation=generation, seeded=count)
-    evolution = evolution_of(experiment.simulator, experiment.config)
+    rollout = dataclasses.replace(experiment.config.rollout, hold=3)
+    config = dataclasses.replace(experiment.config, rollout=rollout)
+    evolution = evolution_of(experiment.simulator, config)
     theirs = jax.jit(evolution.propose)(known).offspring.opponent
     offspring = len(jax.tree.leaves(theirs)[0])
     for place in range(offspring):
@@ -144,8 +152,11 @@ def test_a_body_draws_with_its_like(
 def contests(
     experiment: Experiment, first: Any, played: Callable[[Any], Any]
 ) -> list[tuple[Any, Champion]]:
-    """Contests in evolution's physics: own and MuJoCo's, of some individuals with one opponent."""
-    genomes = met(experiment, first, movers(first)[3])
+    """Contests in evolution's physics: statistics and champions, all against the one that goes far."""
+    alone = played(first)
+    way = np.linalg.norm((alone.place - alone.settled)[:, 0, :2], axis=1)
+    whole = alone.steps[:, 0] == round(SECONDS / 0.01)
+    genomes = met(experiment, first, int(np.argmax(np.where(whole, way, 0.0))))
     stats = played(genomes)
     places = [i for i in movers(first) if stats.steps[i, 0] == round(SECONDS / 0.01)]
     return [
@@ -156,16 +167,18 @@ def contests(
 
 def test_a_contest_goes_as_in_mujoco(contests: list[tuple[Any, Champion]]):
     """The way of the body, and the distances of both from the cube."""
-    apart, moved = [], []
+    apart, moved, theirs = [], [], []
     for stats, champion in contests:
         creature = champion.embodied(load_creature("blocks"))
         outcome = simulate(creature, champion, nominal_starts(creature, 1), SECONDS, record=1)
         middle = outcome.middle[0, -1] + creature.frame.stand_pos
         apart.append(np.abs(middle - stats.place).max())
         moved.append(np.linalg.norm(stats.place - stats.settled))
+        theirs.append(abs(outcome.gaps[0, -1, 1] - outcome.gaps[0, 0, 1]))
         found, steps = nearness(outcome.gaps[0]).sum(), len(outcome.gaps[0])
         assert found / steps == pytest.approx(stats.nearness / steps, abs=0.01)
     assert np.max(moved) > 0.05
+    assert np.min(theirs) > 0.1
     assert np.median(apart) < 0.01
 
 
@@ -273,7 +286,11 @@ def test_walkers_begin_a_run_with_the_first_opponent(experiment: Experiment, fir
     ("changed", "remedy"),
     [
         ({"survival": "best"}, r"take --evolution\.survival children"),
-        ({"survival": "children", "islands": {"count": 2}}, r"take --evolution\.islands\.count 1"),
+        ({"survival": "children", "elite": 0.0}, r"take --evolution\.elite 0\.25"),
+        (
+            {"survival": "children", "elite": 0.25, "islands": {"count": 2}},
+            r"take --evolution\.islands\.count 1",
+        ),
     ],
 )
 def test_settings_under_which_opponents_differ_are_refused(changed: dict[str, Any], remedy: str):
