@@ -187,9 +187,9 @@ class UseConfig:
       controller: what moves the creature: poses, program (docs/reference/expressions.md), network
         (docs/reference/network.md), brain (docs/reference/modular-bodies.md), or FILE.py:CLASS of
         your own (docs/guide/your-own-task.md).
-      task: what the creature is to do: walk, turn, hop, limbo, travel; swim, walk, jump, follow and
-        follow-on-land of bodies that grow (docs/reference/modular-bodies.md); or FILE.py:CLASS of
-        your own.
+      task: what the creature is to do: walk, turn, hop, limbo, travel; swim, walk, jump, follow,
+        follow-on-land, compete, amphibian and all-trades of bodies that grow
+        (docs/reference/modular-bodies.md); or FILE.py:CLASS of your own.
     """
 
     __pydantic_config__ = STRICT

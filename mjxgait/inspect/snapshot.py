@@ -66,8 +66,9 @@ class Snapshot:
 
     @property
     def rows(self) -> np.ndarray:
-        """Genes [P, genes] of all genomes, each in its own unit."""
-        flat = [array.reshape(len(array), -1) for array in self._every_gene.values()]
+        """Genes [P, genes] of all genomes, each in its own unit; without those of an opponent."""
+        own = {n: a for n, a in self._every_gene.items() if not n.startswith("opponent.")}
+        flat = [array.reshape(len(array), -1) for array in own.values()]
         return np.concatenate(flat, axis=1)
 
     def champion(self, rank: int) -> Champion:

@@ -64,16 +64,27 @@ def _check_contest(name: str, config: Config) -> None:
     """Refuse settings under which results against different opponents are compared."""
     if config.evolution.survival != "children":
         raise UserError(
-            f"{name}: opponents change in every generation, and with evolution.survival = "
+            f"{name}: opponents change, and with evolution.survival = "
             f'"{config.evolution.survival}" parents keep what they had against earlier ones; take '
             "--evolution.survival children"
         )
     if not config.evolution.elites:
         raise UserError(
-            f"{name}: opponents change in every generation, and with evolution.elite = "
+            f"{name}: opponents change, and with evolution.elite = "
             f"{config.evolution.elite:g} the best parent is not evaluated again; take "
             "--evolution.elite 0.25"
         )
+    evolution = config.evolution
+    for key, on, remedy in (
+        ("forced.enabled", evolution.forced.enabled, "forced.no-enabled"),
+        ("remember", evolution.remember, "no-remember"),
+        ("restart.every", evolution.restart.every, "restart.every 0"),
+    ):
+        if on:
+            raise UserError(
+                f"{name}: evolution.{key} compares results against different opponents; take "
+                f"--evolution.{remedy}"
+            )
     if config.evolution.islands.count > 1:
         raise UserError(
             f"{name}: each island has its own opponents, so those that migrate would meet another; take "
@@ -84,6 +95,11 @@ def _check_contest(name: str, config: Config) -> None:
 def _check_given(creature: Creature, config: Config) -> None:
     """Refuse settings of bodies that grow, for a body that a file gives."""
     controller, task, name = config.use.controller, config.use.task, creature.name
+    if creature.settings.creature.beside:
+        raise UserError(
+            f"{name}: creature.beside names bodies that a run does not simulate; take them out of "
+            "creature.xml and creature.toml, or evolve such a contest with --env blocks"
+        )
     if config.rollout.step:
         raise UserError(
             f"{name}: rollout.step is for bodies that grow; creature.xml has this one's step"

@@ -55,7 +55,7 @@ def contest_of(creature: Creature) -> Contest | None:
 
 
 class Opponent:
-    """The opponents of `S` simulations, each with its own memory; they are never disturbed."""
+    """The opponents of `S` simulations, each with its own memory. Their joints are not disturbed."""
 
     def __init__(self, contest: Contest, controller: ReferenceController, count: int) -> None:
         self.contest, self.controller = contest, controller

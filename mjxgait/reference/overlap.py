@@ -94,8 +94,8 @@ def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int
     """Return pairs of bodies joined by one joint or by several at one place; welded bodies are one.
 
     In a planar body, pairs of limbs with parallel axes are included: they can only pass each other.
-    MuJoCo excludes parent and child by itself; they are listed all the same. So are pairs of bodies
-    that no joint connects: an opponent may be touched.
+    MuJoCo excludes parent and child by itself; they are listed all the same. So are pairs of a part
+    and one of an opponent: to touch it is no overlap.
     """
     data = posed(model, creature.stand_qpos)
     chains = [_chain(model, body) for body in range(model.nbody)]

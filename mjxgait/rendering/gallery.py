@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from PIL import Image, ImageDraw
 
+from mjxgait.creature.geometry import beside
 from mjxgait.inspect.strategy import WORDS, Motion, strategy
 from mjxgait.rendering.floor import DARK_INK, font
 from mjxgait.rendering.painter import seen_geoms
@@ -67,7 +68,9 @@ def motion_of(walk: Walk) -> Motion:
     # Not the model as shown, which has eyes, goals and a bar.
     model = walk.creature.model
     pos, rot = poses_of(model, walk.qpos[frames], ("geom_xpos", "geom_xmat"))
-    own = seen_geoms(model)
+    shown = seen_geoms(model)
+    others = beside(model, walk.creature.settings.creature.beside)
+    own = shown[~others[model.geom_bodyid[shown]]]
     flat = np.tile(np.eye(3), (len(own), 1, 1))
     local = Silhouettes(model, own).outermost(np.zeros((len(own), 3)), flat, CORNERS)
     points = np.einsum("tbij,bkj->tbki", rot[:, own], local) + pos[:, own, None]

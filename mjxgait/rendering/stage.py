@@ -326,6 +326,8 @@ def _same_scene(first: Walk, other: Walk) -> bool:
     """Return whether one model shows both walks."""
     if first.creature.files["creature.xml"] != other.creature.files["creature.xml"]:
         return False
+    if first.creature.settings.creature.beside:
+        return False
     specs = [walk.source for walk in (first, other)]
     return len({None if spec is None else spec.to_xml() for spec in specs}) == 1
 

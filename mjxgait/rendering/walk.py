@@ -17,7 +17,7 @@ from mjxgait.certification.acceptance import how_simulated
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
-from mjxgait.controllers.sims_brain.reference_body import THEIRS, genes_of_opponent, grow
+from mjxgait.controllers.sims_brain.reference_body import THEIRS, grow, opponent_genome
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.reference.layout import RADIUS, Ground, StartFrame, start_frame
@@ -162,7 +162,7 @@ class Walk:
         if not self.grown:
             return spec
         self._dress(spec, self.champion.genome, "")
-        if theirs := genes_of_opponent(self.champion.genome):
+        if theirs := opponent_genome(self.champion.genome):
             self._dress(spec, theirs, THEIRS)
             spec.geom(self.creature.settings.creature.beside[1]).rgba = CUBE_COLOUR
         return spec

@@ -17,11 +17,11 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.files import DamagedFile, read_bytes, write_bytes
-from mjxgait.training.checkpoint import Checkpoints, first_difference
+from mjxgait.training.checkpoint import first_difference
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import open_run
-from mjxgait.training.stored import read_stored
+from mjxgait.training.stored import read_stored, stored_generations
 from mjxgait.types import by_name
 
 INITIAL = "initial.npz"
@@ -133,7 +133,7 @@ def check_initial(initial: Initial, experiment: Experiment) -> None:
 
 def has_begun(folder: Path) -> bool:
     """Return whether a run has its first individuals."""
-    return (folder / INITIAL).exists() or bool(Checkpoints(folder).generations())
+    return (folder / INITIAL).exists() or bool(stored_generations(folder))
 
 
 def keep_initial(folder: Path, initial: Initial) -> None:

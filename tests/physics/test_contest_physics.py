@@ -1,18 +1,26 @@
-"""Blocks of two bodies that push each other, and a whole contest against C MuJoCo."""
+"""Blocks of two bodies that push each other, and the cube."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from end_to_end.unevolved import embodied
 
+from mjxgait.api import load_creature
 from mjxgait.controllers.sims_brain.reference_body import CUBE, CUBE_DENSITY
 from mjxgait.physics.batched_trees.arena import cube_tree, resting
 from mjxgait.physics.batched_trees.collision import Boxes, gap, pushes
 from mjxgait.physics.batched_trees.dynamics import weighed
-from mjxgait.physics.lane_major.lanes import pinned_by
+from mjxgait.physics.lane_major.lanes import pinned_by, separate_kernels
+from mjxgait.plugins.registry import build_config
+from mjxgait.reference.contest import contest_of
+from mjxgait.simulation.episode import first_body
+from mjxgait.training.experiment import build_experiment
+from mjxgait.types import BodyState
 
 LANES, STEP = 16, 0.01
 
@@ -141,3 +149,122 @@ def test_the_cube_weighs_as_any_body_of_its_shape():
         f' density="{CUBE_DENSITY}"/></body></worldbody></mujoco>'
     )
     np.testing.assert_allclose(cube.inertia[0], model.body_inertia[1], rtol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def contest() -> SimpleNamespace:
+    """A body and an opponent that grew, with their cube: evolution's plant, and MuJoCo's model."""
+    table = {
+        "use": {"controller": "brain", "task": "compete"},
+        "controller": {"nodes": 3, "parts": 3, "links": 3, "local": 2, "central": 1},
+        "evolution": {
+            "population": 12,
+            "survival": "children",
+            "elite": 0.25,
+            "forced": {"enabled": False},
+        },
+    }
+    blocks = load_creature("blocks")
+    experiment = build_experiment(blocks, build_config(table, "test"))
+    state = embodied(experiment)
+    one = jax.tree.map(lambda leaf: jnp.asarray(leaf[0]), state.genomes)
+    met = dataclasses.replace(one, opponent=dataclasses.replace(one, opponent=None))
+    own = jax.tree.map(lambda leaf: leaf[None], met)
+    blank = np.zeros((1, 1, 3))
+    known = dataclasses.replace(state, genomes=own, fitness=blank[0, 0], terms=blank, outcome=blank)
+    creature = experiment.champion(known, {}).embodied(blocks)
+    start = jax.tree.map(lambda leaf: leaf[0], experiment.starts)
+    body = first_body(experiment.simulator.bodies(met, start))
+    return SimpleNamespace(plant=experiment.simulator.plant, body=body, creature=creature)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pushes_are_the_joints_forces_that_mujoco_computes_from_them(
+    contest: SimpleNamespace, seed: int
+):
+    """Bodies and cube thrown into each other: generalised forces, and distances from the cube."""
+    rng, model = np.random.default_rng(seed), contest.creature.model
+    states = [contest.body, contest.body.ground.opponent, contest.body.ground.cube]
+    hinges = [np.flatnonzero(np.asarray(state.parameters.moves)[1:] > 0) for state in states]
+    thrown = [_thrown(rng, *pair) for pair in zip(states, hinges, strict=True)]
+    arena = dataclasses.replace(contest.body.ground, opponent=thrown[1], cube=thrown[2])
+    lane = jax.tree.map(
+        lambda leaf: jnp.asarray(leaf)[..., None], dataclasses.replace(thrown[0], ground=arena)
+    )
+    plant, still = contest.plant, jnp.zeros_like(lane.qvel)
+    with separate_kernels():
+        sensed, moment = plant.forward(lane)
+        after = plant.advance(lane, moment, still)
+        loose = dataclasses.replace(moment, push=jax.tree.map(jnp.zeros_like, moment.push))
+        alone, moved = (plant.advance(lane, loose, t) for t in (still, moment.push[0]))
+    np.testing.assert_allclose(after.qvel, moved.qvel, rtol=1e-3, atol=1e-3)
+    three = [(one, one.ground.opponent, one.ground.cube) for one in (after, alone)]
+    for one, other, push in zip(*three, moment.push, strict=True):
+        assert (np.abs(one.qvel - other.qvel).max() > 0.01) == (np.abs(push).max() > 1)
+    data = mujoco.MjData(model)
+    places = [np.append(np.arange(7), 7 + moves) for moves in hinges]
+    dofs = [np.append(np.arange(6), 6 + moves) for moves in hinges]
+    pairs = zip(thrown, places, dofs, strict=True)
+    poses, speeds = zip(*((s.qpos[p], s.qvel[d]) for s, p, d in pairs), strict=True)
+    data.qpos[:], data.qvel[:] = np.concatenate(poses), np.concatenate(speeds)
+    mujoco.mj_forward(model, data)
+    found = contest_of(contest.creature)
+    assert found is not None
+    geoms = [*found.geoms, np.array([found.cube])]
+    expected = _applied(model, data, geoms)
+    mine = np.concatenate([np.asarray(p)[d, 0] for p, d in zip(moment.push, dofs, strict=True)])
+    assert np.abs(expected).max() > 10
+    np.testing.assert_allclose(mine, expected, atol=1e-4 * np.abs(expected).max())
+    gaps = found.gaps(data.geom_xpos[None], data.geom_xmat[None])[0]
+    np.testing.assert_allclose(np.asarray(sensed.body.gaps)[:, 0], gaps, atol=1e-5)
+
+
+def _thrown(rng: np.random.Generator, state: BodyState, hinges: np.ndarray) -> BodyState:
+    """A state at a random place in the air, in any attitude, in motion."""
+    qpos, qvel = np.zeros_like(state.qpos), np.zeros_like(state.qvel)
+    turn = rng.normal(size=4)
+    qpos[:7] = [*rng.uniform(-0.2, 0.2, 2), rng.uniform(0.8, 1.2), *turn / np.linalg.norm(turn)]
+    qpos[7 + hinges] = rng.uniform(-0.4, 0.4, len(hinges))
+    qvel[:6] = rng.uniform(-1, 1, 6)
+    qvel[6 + hinges] = rng.uniform(-1, 1, len(hinges))
+    return dataclasses.replace(state, qpos=qpos, qvel=qvel)
+
+
+def _applied(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[np.ndarray]) -> np.ndarray:
+    """Generalised force of the pushes between three bodies, each force applied to its block."""
+    each = [_seen(model, data, own) for own in geoms]
+    force, found = [np.zeros((len(own), 6)) for own in geoms], np.zeros(model.nv)
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        for k, more in zip(
+            (i, j), pushes(each[i], each[j], STEP, pinned_by(jnp.ones(1))), strict=True
+        ):
+            force[k] += np.asarray(more)[:, :, 0]
+    for own, pulls in zip(geoms, force, strict=True):
+        for geom, pull in zip(own, pulls, strict=True):
+            body, place = int(model.geom_bodyid[geom]), data.geom_xpos[geom]
+            mujoco.mj_applyFT(model, data, pull[3:], pull[:3], place, body, found)
+    return found
+
+
+def _seen(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> Boxes:
+    """Blocks of MuJoCo's data, in one lane."""
+    motion = np.zeros((len(geoms), 6))
+    for row, geom in zip(motion, geoms, strict=True):
+        kind = mujoco.mjtObj.mjOBJ_GEOM
+        mujoco.mj_objectVelocity(model, data, kind, int(geom), row, 0)
+
+    def vector(array: np.ndarray) -> tuple[jax.Array, jax.Array, jax.Array]:
+        x, y, z = (jnp.asarray(array[:, c, None], jnp.float32) for c in range(3))
+        return x, y, z
+
+    axes, size = data.geom_xmat[geoms].reshape(-1, 3, 3), model.geom_size[geoms]
+    mass = jnp.asarray(model.body_mass[model.geom_bodyid[geoms], None], jnp.float32)
+    return Boxes(
+        vector(data.geom_xpos[geoms]),
+        (vector(axes[:, :, 0]), vector(axes[:, :, 1]), vector(axes[:, :, 2])),
+        vector(size),
+        mass,
+        jnp.ones_like(mass),
+        vector(motion[:, :3]),
+        vector(motion[:, 3:]),
+    )

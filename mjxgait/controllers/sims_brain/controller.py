@@ -98,8 +98,8 @@ class Brains:
         return opposed(usual) if OPPONENT in self.reads else usual
 
     def genes(self, genomes: Genotype, settings: BrainConfig) -> np.ndarray:
-        """Kinds, flags and numbers as they are, in no common unit."""
-        leaves = [np.asarray(leaf, float) for leaf in jax.tree.leaves(genomes)]
+        """Kinds, flags and numbers as they are, in no common unit; without the opponent's."""
+        leaves = [np.asarray(leaf, float) for leaf in jax.tree.leaves(alone(genomes))]
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
     def numbers(self, genomes: Genotype) -> Mapping[str, np.ndarray]:

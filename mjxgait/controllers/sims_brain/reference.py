@@ -15,8 +15,8 @@ from mjxgait.controllers.sims_brain.reference_body import (
     SENSORS,
     THEIRS,
     Part,
-    genes_of_opponent,
     grow,
+    opponent_genome,
 )
 from mjxgait.creature import Creature
 from mjxgait.reference.controllers import Command, Memory
@@ -255,7 +255,7 @@ def opponent_reference(creature: Creature, champion: Champion, step: float) -> B
     model = creature.model
     names = [model.joint(j).name for j in range(model.njnt)]
     theirs = [n.removeprefix(THEIRS) for n in names if n.startswith(f"{THEIRS}part")]
-    return _reference(genes_of_opponent(champion.genome), champion.settings, theirs, step)
+    return _reference(opponent_genome(champion.genome), champion.settings, theirs, step)
 
 
 def _reference(

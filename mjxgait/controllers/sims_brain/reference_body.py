@@ -43,8 +43,8 @@ HARDEST = 2.0
 """Contact time constant (`solref`) in steps: the smallest that MuJoCo simulates as given."""
 DRAG = 500.0
 """N·s/m³; drag of water on a face per area and normal velocity."""
-IN_LIGHT = ("follow", "follow-on-land")
-"""Tasks with a light; without one its observations are zero."""
+IN_LIGHT = ("follow", "follow-on-land", "compete")
+"""Tasks with a light (in a contest the cube); without one its observations are zero."""
 LIGHT = 10.0
 """m from a creature to its light: too far to be reached."""
 CUBE, CUBE_DENSITY = 0.25, 500.0
@@ -168,7 +168,7 @@ def reach(parts: Sequence[Part]) -> float:
     return float((corners[:, 0] + corners[:, 2]).max() - corners[:, 2].min())
 
 
-def genes_of_opponent(genome: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def opponent_genome(genome: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return the arrays of the opponent's own genome; empty without one."""
     start = "opponent."
     return {name.removeprefix(start): a for name, a in genome.items() if name.startswith(start)}

@@ -12,8 +12,8 @@ from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.reference_body import (
     FRICTION,
     GRAVITY,
-    genes_of_opponent,
     grow,
+    opponent_genome,
 )
 from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature import Creature
@@ -60,7 +60,7 @@ class GraphSerializer(PlainSerializer[BrainConfig]):
         creature: Creature,
     ) -> Creature:
         """The grown body, in the water or on the ground of its task, with its opponent if any."""
-        wet, theirs = in_water(task), genes_of_opponent(genome)
+        wet, theirs = in_water(task), opponent_genome(genome)
         files = body_files(
             grow(genome, settings.parts, settings.links),
             creature.name,

@@ -48,7 +48,7 @@ KINDS = (
         "compete",
         task="compete:Compete",
         criteria="compete_criteria:CompeteCriteria",
-        tables=("roam", "compete"),
+        tables=("compete",),
         what="be nearer to a cube than an opponent; for bodies that grow",
     ),
     _kind(

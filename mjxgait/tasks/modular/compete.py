@@ -1,7 +1,7 @@
 """Compete task for modular bodies: be nearer to a cube than an opponent is (Sims 1994).
 
-Each individual meets the best of the generation before. Both start at the same distance from the
-cube, face it, and observe its direction in the axes of each block.
+All individuals meet the same opponent, the best of an earlier generation. Both face the cube at the
+start, and observe its direction in the axes of each block.
 """
 
 import dataclasses

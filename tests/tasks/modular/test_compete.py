@@ -20,7 +20,7 @@ from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.config.schema import Config
 from mjxgait.controllers.sims_brain.operators import Genotype
-from mjxgait.controllers.sims_brain.reference_body import CUBE, DISTANCE, genes_of_opponent, grow
+from mjxgait.controllers.sims_brain.reference_body import CUBE, DISTANCE, grow, opponent_genome
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.plugins.fit import check_fit
@@ -37,10 +37,15 @@ from mjxgait.types import by_name
 from mjxgait.web.page import build_page
 
 SECONDS, COUNT = 1.6, 60
+RACE = {
+    "survival": "children",
+    "elite": 0.25,
+    "forced": {"enabled": False},
+}
 TABLE: dict[str, Any] = {
     "use": {"controller": "brain", "task": "compete"},
     "controller": {"nodes": 3, "parts": 3, "links": 3, "local": 2, "central": 1},
-    "evolution": {"population": COUNT, "survival": "children", "elite": 0.25},
+    "evolution": {"population": COUNT, **RACE},
     "seed": 1,
     "rollout": {"seconds": SECONDS, "starts": 1, "promote": 1.0, "lanes": 24},
     "fitness": {"settle": 0.0},
@@ -100,9 +105,7 @@ def alike(one: Any, other: Any) -> bool:
     return all(np.array_equal(a, b) for a, b in pairs)
 
 
-@pytest.mark.parametrize(
-    ("generation", "changes"), [(-1, False), (0, True), (1, False), (6, True)]
-)
+@pytest.mark.parametrize(("generation", "changes"), [(-1, False), (0, True), (1, False), (6, True)])
 def test_all_meet_the_best_of_the_generation_before(
     experiment: Experiment, generation: int, changes: bool
 ):
@@ -190,7 +193,7 @@ def test_the_examined_model_holds_both_and_the_cube(contests: list[tuple[Any, Ch
     assert contest is not None
     settings = champion.settings
     own = grow(champion.genome, settings.parts, settings.links)
-    theirs = grow(genes_of_opponent(champion.genome), settings.parts, settings.links)
+    theirs = grow(opponent_genome(champion.genome), settings.parts, settings.links)
     assert [len(geoms) for geoms in contest.geoms] == [len(own), len(theirs)]
     assert model.nbody == 1 + len(own) + len(theirs) + 1
     assert len(creature.joints.names) == sum(len(part.hinges) for part in own)
@@ -285,16 +288,15 @@ def test_walkers_begin_a_run_with_the_first_opponent(experiment: Experiment, fir
 @pytest.mark.parametrize(
     ("changed", "remedy"),
     [
-        ({"survival": "best"}, r"take --evolution\.survival children"),
-        ({"survival": "children", "elite": 0.0}, r"take --evolution\.elite 0\.25"),
-        (
-            {"survival": "children", "elite": 0.25, "islands": {"count": 2}},
-            r"take --evolution\.islands\.count 1",
-        ),
+        ({"survival": "best", "elite": 0.0}, r"take --evolution\.survival children"),
+        ({"elite": 0.0}, r"take --evolution\.elite 0\.25"),
+        ({"remember": True}, r"take --evolution\.no-remember"),
+        ({"forced": {"enabled": True}}, r"take --evolution\.forced\.no-enabled"),
+        ({"islands": {"count": 2}}, r"take --evolution\.islands\.count 1"),
     ],
 )
 def test_settings_under_which_opponents_differ_are_refused(changed: dict[str, Any], remedy: str):
-    config = config_of(evolution={"population": COUNT} | changed)
+    config = config_of(evolution={"population": COUNT} | RACE | changed)
     with pytest.raises(UserError, match=remedy):
         check_fit(load_creature("blocks"), config)
 
