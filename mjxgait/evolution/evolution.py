@@ -41,7 +41,7 @@ class Evolution:
     config: EvolutionConfig
     variation: Variation
     rank: Callable[[jax.Array, jax.Array], jax.Array]
-    hold: jax.Array | int = 1
+    hold: jax.Array | int = dataclasses.field(default=1, kw_only=True)
 
     def init(self, key: jax.Array, trials: int, terms: int, outcomes: int) -> EvolutionState:
         """Return the state before any evaluation. trials, terms, outcomes: R, F, O."""

@@ -57,7 +57,7 @@ def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
         return score(terms, weights, settings.rollout.worst, settings.rollout.caution)
 
     variation = simulator.controller.variation(settings.controller, settings.evolution)
-    return Evolution(settings.evolution, variation, rank, settings.rollout.hold)
+    return Evolution(settings.evolution, variation, rank, hold=settings.rollout.hold)
 
 
 def first_state(

@@ -156,7 +156,7 @@ def contest() -> SimpleNamespace:
     """A body and an opponent that grew, with their cube: evolution's plant, and MuJoCo's model."""
     table = {
         "use": {"controller": "brain", "task": "compete"},
-        "controller": {"nodes": 3, "parts": 3, "links": 3, "local": 2, "central": 1},
+        "controller": {"nodes": 2, "parts": 2, "links": 2, "local": 1, "central": 1},
         "evolution": {
             "population": 12,
             "survival": "children",
