@@ -46,8 +46,8 @@ class Variation(Generic[Genome]):
     project: genomes [..., ...] -> those with the relations among genes that every new genome has.
     `create` and `mutate` apply it themselves, a drawn distribution does not.
     met: genomes [M, ...], the best genome of the last generation, whether [] opponents change now
-    -> the same genomes, whose opponent is that one, or else its own opponent; None where genomes
-    have no opponent.
+    -> the same genomes, to meet that one as their opponent, or else its own opponent; None where
+    genomes have no opponent.
     """
 
     create: Callable[[jax.Array, int], Genome]

@@ -18,6 +18,7 @@ from mjxgait.reference.layout import (
     LowestPoint,
     colliding_geoms,
     foot_middles,
+    own_directions,
     per_foot,
     start_frame,
 )
@@ -224,10 +225,7 @@ class Bodies:
         light = np.where(moved, starts.moved_light[rows], starts.light[rows])[:, None]
         there = self.start.place + light - self.geom_xpos[rows][:, self.feet.geoms]
         there = np.where(light.any(2, keepdims=True), there, 0.0)
-        there /= np.maximum(np.linalg.norm(there, axis=2, keepdims=True), 1e-9)
-        rot = self.geom_xmat[rows][:, self.feet.geoms].reshape(*there.shape, 3)
-        seen: np.ndarray = (there[:, :, None] @ rot)[:, :, 0]
-        return seen
+        return own_directions(there, self.geom_xmat[rows][:, self.feet.geoms])
 
     def travel(self, rows: np.ndarray) -> np.ndarray:
         """Return the way [rows, 3] from the start in m: forward, left, up."""

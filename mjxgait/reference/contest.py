@@ -10,7 +10,7 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.reference.controllers import Memory, ReferenceController
-from mjxgait.reference.layout import LowestPoint
+from mjxgait.reference.layout import LowestPoint, own_directions
 from mjxgait.reference.state import CONTACT_GAP
 
 
@@ -37,16 +37,15 @@ class Contest:
         found = []
         for geoms in self.geoms:
             away = xpos[:, [self.cube]] - xpos[:, geoms]
-            along = np.einsum("sgij,sgi->sgj", _axes(xmat[:, geoms]), away)
+            axes = xmat[:, geoms].reshape(*away.shape, 3)
+            along = np.einsum("sgij,sgi->sgj", axes, away)
             beyond = np.maximum(np.abs(along) - self.model.geom_size[geoms], 0.0)
             found.append(np.linalg.norm(beyond, axis=2).min(1))
         return np.stack(found, axis=1)
 
     def to_cube(self, xpos: np.ndarray, xmat: np.ndarray, geoms: np.ndarray) -> np.ndarray:
         """Return the cube's direction [S, G, 3] in the own axes of some geoms."""
-        there = xpos[:, [self.cube]] - xpos[:, geoms]
-        there = there / np.linalg.norm(there, axis=2, keepdims=True)
-        return np.einsum("sgij,sgi->sgj", _axes(xmat[:, geoms]), there)
+        return own_directions(xpos[:, [self.cube]] - xpos[:, geoms], xmat[:, geoms])
 
 
 def contest_of(creature: Creature) -> Contest | None:
@@ -94,8 +93,3 @@ class Opponent:
         self.command[rows], after = self.controller.act(before, senses)
         for name, values in after.items():
             self.memory[name][rows] = values
-
-
-def _axes(xmat: np.ndarray) -> np.ndarray:
-    """Return rotation matrices [S, G, 3, 3] whose columns are the geoms' own axes."""
-    return xmat.reshape(*xmat.shape[:2], 3, 3)

@@ -136,6 +136,16 @@ class LowestPoint:
         return self.heights(xpos, xmat).min(1, initial=np.inf)
 
 
+def own_directions(there: np.ndarray, xmat: np.ndarray) -> np.ndarray:
+    """Return directions [S, G, 3] in the own axes of geoms; zero where `there` is.
+
+    there: [S, G, 3] m, from each geom. xmat: [S, G, 9].
+    """
+    there = there / np.maximum(np.linalg.norm(there, axis=2, keepdims=True), 1e-9)
+    seen: np.ndarray = (there[:, :, None] @ xmat.reshape(*there.shape, 3))[:, :, 0]
+    return seen
+
+
 def colliding_geoms(model: mujoco.MjModel) -> np.ndarray:
     """Return the ids of the moving geoms that can collide."""
     solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)

@@ -108,8 +108,7 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
 def _contest(walk: Walk, rate: int) -> WalkLoop:
     """A contest as recorded, about the place of the cube at the start."""
     model, cube = walk.creature.model, walk.creature.settings.creature.beside[1]
-    count = max(int(walk.seconds * rate), 2)
-    qpos = resampled(model, walk.qpos, np.arange(count) / rate / walk.time_step)
+    qpos = _whole(walk, rate)
     middle = walk.qpos[0, model.joint(cube).qposadr[0] :][:2]
     for place in model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]:
         qpos[:, place : place + 2] -= middle
@@ -118,16 +117,20 @@ def _contest(walk: Walk, rate: int) -> WalkLoop:
 
 def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
     """The whole walk as recorded, also one that falls, in place and with a seam."""
-    model, place = walk.creature.model, walk.creature.root_qpos
-    count = max(int(walk.seconds * rate), 2)
-    qpos = resampled(model, walk.qpos, np.arange(count) / rate / walk.time_step)
+    place, qpos = walk.creature.root_qpos, _whole(walk, rate)
     advance = float((qpos[-1, place : place + 2] - qpos[0, place : place + 2]) @ walk.forward)
-    share = np.linspace(0.0, 1.0, count)[:, None]
+    share = np.linspace(0.0, 1.0, len(qpos))[:, None]
     qpos[:, place + 2] -= walk.ground_heights(qpos[:, place : place + 2])
     qpos[:, place : place + 2] -= (1 - share) * qpos[0, place : place + 2] + share * qpos[
         -1, place : place + 2
     ]
     return WalkLoop(walk, qpos, rate, 0, advance, 1.0, (0, len(walk.qpos) - 1))
+
+
+def _whole(walk: Walk, rate: int) -> np.ndarray:
+    """Poses [F, nq] of a whole walk."""
+    count = max(int(walk.seconds * rate), 2)
+    return resampled(walk.creature.model, walk.qpos, np.arange(count) / rate / walk.time_step)
 
 
 def resampled(model: mujoco.MjModel, qpos: np.ndarray, frames: np.ndarray) -> np.ndarray:

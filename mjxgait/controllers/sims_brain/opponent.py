@@ -9,9 +9,14 @@ from mjxgait.controllers.sims_brain.controller import LIGHT, Brains, directions
 from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
 from mjxgait.controllers.sims_brain.operators import Genotype
 from mjxgait.controllers.sims_brain.phenotype import Body, body_of
-from mjxgait.controllers.sims_brain.reference_body import CUBE, CUBE_DENSITY, DISTANCE
+from mjxgait.controllers.sims_brain.reference_body import (
+    CUBE,
+    CUBE_DENSITY,
+    DISTANCE,
+    HALF_A_TURN,
+)
 from mjxgait.creature.body import Body as Facts
-from mjxgait.physics.batched_trees.arena import TURNED, Act, Arena, cube_tree, reach, resting
+from mjxgait.physics.batched_trees.arena import Act, Arena, cube_tree, reach, resting
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Tree
 from mjxgait.types import Sensed
@@ -52,7 +57,7 @@ def arena_of(
     still, none, half = jnp.zeros(own.tree.links - 1), jnp.zeros(()), CUBE / 2
     middle = mine + DISTANCE + half
     far = jnp.stack([middle + half + DISTANCE + its, none, none])
-    facing = jnp.concatenate([far, jnp.asarray(TURNED), still])
+    facing = jnp.concatenate([far, jnp.asarray(HALF_A_TURN), still])
     bent = jnp.concatenate([start[:7], start[7:] * own.tree.moves[1:]])
     rested = jax.vmap(plant.rested)(trees, jnp.stack([bent, facing]))
     cube = jnp.stack([middle, none, none + half])

@@ -49,6 +49,8 @@ LIGHT = 10.0
 """m from a creature to its light: too far to be reached."""
 CUBE, CUBE_DENSITY = 0.25, 500.0
 """m and kg/m³: side and density of the cube of a contest."""
+HALF_A_TURN = (0.0, 0.0, 0.0, 1.0)
+"""Quaternion about the vertical: the opponent faces the body."""
 THEIRS = "opponent_"
 """Beginning of the names of the opponent's bodies, joints and geoms in a model."""
 DISTANCE = 0.8

@@ -13,6 +13,7 @@ from mjxgait.controllers.sims_brain.reference_body import (
     DAMPING,
     DENSITY,
     DISTANCE,
+    HALF_A_TURN,
     HARDEST,
     ROTOR,
     THEIRS,
@@ -27,7 +28,6 @@ SPIN, ROLL = 0.005, 0.0001
 
 
 CUBE_NAME = "cube"
-HALF_A_TURN = (0.0, 0.0, 0.0, 1.0)
 
 
 def body_xml(

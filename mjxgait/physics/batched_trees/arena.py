@@ -1,7 +1,7 @@
 """Physics step of a modular body, its opponent, and a cube between them (Sims 1994, competition).
 
 The body's own state is as on open ground. All else is its `Arena`, in `BodyState.ground`: the
-opponent, whose brain acts here, and the cube. All three push each other.
+opponent with its brain, and the cube. All three push each other.
 """
 
 import dataclasses
@@ -38,8 +38,6 @@ from mjxgait.types import BodyState, Plant, Sensed, pytree
 
 Act = Callable[[Any, Any, Sensed], tuple[jax.Array, Any]]
 """From the opponent's brain, memory and observations (one lane) to torques [J] and memory."""
-TURNED = (0.0, 0.0, 0.0, 1.0)
-"""Quaternion of half a turn about the vertical: the opponent faces the body."""
 
 
 @pytree
@@ -91,7 +89,7 @@ class ArenaPlant(Plant[ArenaMoment]):
         parts = (mine, its, of_cube), (first, second, cube)
         boxes = [one_kernel(_boxes)(*each) for each in zip(states, *parts, strict=True)]
         boxes[2] = jax.tree.map(lambda leaf: leaf[:1], boxes[2])
-        push = self._pushed(states, parts[1], boxes)
+        push = self._generalised(states, parts[1], boxes)
         place = of_cube.trunk_pos
         gaps = jnp.stack([gap(each, (place[0], place[1], place[2])) for each in boxes[:2]])
         mine, its = (_with_cube(each, place, gaps) for each in (mine, its))
@@ -131,7 +129,7 @@ class ArenaPlant(Plant[ArenaMoment]):
         due = arena.count.reshape(-1)[0] % self.every == 0
         return jax.lax.cond(due, acted, lambda: (arena.torque, arena.mind))
 
-    def _pushed(
+    def _generalised(
         self, states: tuple[BodyState, ...], moments: tuple[Moment, ...], boxes: list[Boxes]
     ) -> tuple[jax.Array, jax.Array, jax.Array]:
         """Return the generalised forces by which body, opponent and cube push each other."""

@@ -13,9 +13,9 @@ import jax.numpy as jnp
 from typing_extensions import override
 
 from mjxgait.controllers.sims_brain.controller import directions
-from mjxgait.tasks.modular.base import LITTLE, SHARPNESS, lost, own
+from mjxgait.tasks.modular.base import LITTLE, lost, own
 from mjxgait.tasks.modular.config import CompeteConfig, CompeteWeights
-from mjxgait.tasks.modular.roam import Roam, RoamStats
+from mjxgait.tasks.modular.roam import Roam, RoamStats, shaken
 from mjxgait.types import Sensed, pytree
 
 
@@ -62,8 +62,7 @@ class Compete(Roam):
         """The share of the cube; its loss by overlap, and of the rest by vibration."""
         share = self._share(stats)
         inside = lost(stats.overlap / settings.overlap)
-        shaken = jnp.sqrt(stats.jerked / jnp.maximum(stats.moved, LITTLE))
-        vibrates = (1 - inside) * lost((shaken / settings.vibration) ** SHARPNESS)
+        vibrates = (1 - inside) * shaken(stats, settings.vibration)
         return {"share": share, "overlap": share * inside, "vibration": share * vibrates}
 
     @override

@@ -5,12 +5,11 @@ from typing_extensions import override
 
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, at_least
-from mjxgait.certification.describe import vibration
 from mjxgait.champion import Champion
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import Starts
-from mjxgait.tasks.modular.criteria import ModularCriteria, seen
+from mjxgait.tasks.modular.criteria import ModularCriteria, in_trial, seen, unshaken
 from mjxgait.tasks.modular.thresholds import CompeteThresholds
 
 DRAW = 0.5
@@ -41,15 +40,15 @@ class CompeteCriteria(ModularCriteria):
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
         """For the undisturbed trial, not for all."""
-        return float(champion.origin.get("nominal", {}).get("share", np.nan))
+        return in_trial(champion, "share")
 
     @override
     def since(self, champion: Champion, config: CertificateConfig) -> float:
-        return float(champion.origin.get("nominal", {}).get("since", config.warmup))
+        return in_trial(champion, "since", config.warmup)
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
         """Criterion 7, no motion by vibration."""
-        return (Criterion(7, "gait", (vibration(window, config.gait),)),)
+        return (unshaken(window, config),)
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
         """Simulations that the body wins: nearer to the cube, over the second half of the time."""

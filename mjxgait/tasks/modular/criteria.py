@@ -127,7 +127,7 @@ class ModularCriteria(StaysUp, abc.ABC):
 
         It fails if the episode ended before anything counted.
         """
-        seconds = champion.origin.get("nominal", {}).get("seconds", np.inf)
+        seconds = in_trial(champion, "seconds", np.inf)
         promised = self.promise(champion, seconds, config)
         window = whole.window(self.since(champion, config), seconds)
         done = self.done(window) if len(window.trunk_pos) > 1 else np.nan
@@ -239,6 +239,11 @@ def counted(frames: np.ndarray, outcome: Outcome, config: CertificateConfig) -> 
     return frames[:, round(config.warmup / outcome.trajectory.time_step) :]
 
 
+def in_trial(champion: Champion, metric: str, without: float = np.nan) -> float:
+    """Metric of the champion's undisturbed trial in evolution. without: where it has none."""
+    return float(champion.origin.get("nominal", {}).get(metric, without))
+
+
 def seen(recording: Recording) -> Grown:
     """Recorded data of a modular body."""
     assert recording.grown is not None
@@ -295,8 +300,12 @@ class RoamCriteria(GoingCriteria):
 
 def on_land(window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
     """Evaluate the criteria of walking alone: 1, and 7, no motion by vibration."""
-    gait = Criterion(7, "gait", (vibration(window, config.gait),))
-    return (balanced(window, config.roam), gait)
+    return (balanced(window, config.roam), unshaken(window, config))
+
+
+def unshaken(window: Recording, config: CertificateConfig) -> Criterion:
+    """7. No motion by vibration."""
+    return Criterion(7, "gait", (vibration(window, config.gait),))
 
 
 def balanced(window: Recording, config: RoamThresholds) -> Criterion:
@@ -336,7 +345,7 @@ class JumpCriteria(ModularCriteria):
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
         """For the undisturbed trial, not for all."""
-        return float(champion.origin.get("nominal", {}).get("height", np.nan))
+        return in_trial(champion, "height")
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
         """Simulations with a high enough leap in the median span."""

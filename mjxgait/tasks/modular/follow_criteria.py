@@ -13,7 +13,7 @@ from mjxgait.controllers.sims_brain.reference_body import DRAG, LIGHT
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import Starts
-from mjxgait.tasks.modular.criteria import ModularCriteria, by_water, counted, seen
+from mjxgait.tasks.modular.criteria import ModularCriteria, by_water, counted, in_trial, seen
 from mjxgait.tasks.modular.criteria import on_land as walks
 from mjxgait.tasks.modular.thresholds import FollowThresholds
 
@@ -55,12 +55,11 @@ class FollowCriteria(ModularCriteria):
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
         """For the light of the recording, not for all."""
-        way = champion.origin.get("nominal", {}).get("way", np.nan)
-        return float(way / (seconds - self.since(champion, config)))
+        return in_trial(champion, "way") / (seconds - self.since(champion, config))
 
     @override
     def since(self, champion: Champion, config: CertificateConfig) -> float:
-        return float(champion.origin.get("nominal", {}).get("since", config.warmup))
+        return in_trial(champion, "since", config.warmup)
 
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None

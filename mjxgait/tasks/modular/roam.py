@@ -84,11 +84,16 @@ class Roam(LocomotionTask):
         inside = lost(stats.overlap / settings.overlap)
         tilt = jnp.degrees(jnp.arccos(jnp.clip(stats.upright, -1.0, 1.0)))
         tipped = (1 - inside) * lost(tilt / settings.tilt)
-        shaken = jnp.sqrt(stats.jerked / jnp.maximum(stats.moved, LITTLE))
-        vibrates = (1 - inside - tipped) * lost((shaken / settings.vibration) ** SHARPNESS)
+        vibrates = (1 - inside - tipped) * shaken(stats, settings.vibration)
         return {
             "speed": speed,
             "overlap": earned * inside,
             "balance": earned * tipped,
             "vibration": earned * vibrates,
         }
+
+
+def shaken(stats: RoamStats, half: jax.Array | float) -> jax.Array:
+    """Share [] lost by joints that vibrate; half: vibration at which it is one half."""
+    vibration = jnp.sqrt(stats.jerked / jnp.maximum(stats.moved, LITTLE))
+    return lost((vibration / half) ** SHARPNESS)
