@@ -19,7 +19,7 @@ PICTURE = b"\x89PNG picture of a fur"
 
 def treading_loop(creature: Creature) -> WalkLoop:
     """A loop of a walk on the spot, of 0.5 s."""
-    return walk_loop(record_walk(creature, treading(creature, degrees=5.0), 4.0), 30)
+    return walk_loop(record_walk(creature, treading(creature, degrees=5.0), 2.5), 30)
 
 
 def parts(data: bytes) -> tuple[dict, bytes]:

@@ -22,7 +22,7 @@ HALF_A_DEGREE = np.radians(0.5)
 @pytest.fixture(scope="module", params=["tall_quadruped", "duck"])
 def loop(request: pytest.FixtureRequest) -> WalkLoop:
     creature = load_creature(find_creature(request.param))
-    return walk_loop(record_walk(creature, treading(creature, degrees=8.0), 4.0), 30)
+    return walk_loop(record_walk(creature, treading(creature, degrees=8.0), 2.5), 30)
 
 
 def written(loop: WalkLoop, folder, travelling: bool = False):

@@ -42,7 +42,7 @@ OTHERS = ("alien", "duck", "short_quadruped", "tall_quadruped")
 )
 def loop(request):
     creature = load_creature(find_creature(request.param))
-    return walk_loop(record_walk(creature, treading(creature, degrees=8.0), 4.0), 30)
+    return walk_loop(record_walk(creature, treading(creature, degrees=8.0), 2.5), 30)
 
 
 def read(document, accessor):

@@ -258,10 +258,15 @@ def test_a_character_twice_as_large_takes_longer_steps(case: Case, tmp_path: Pat
     assert speeds[0] == pytest.approx(2 * speeds[1])
 
 
-def test_a_skeleton_of_bvh_walks_on_the_same_character(case: Case, tmp_path: Path):
-    (tmp_path / "dog.bvh").write_text(bvh())
-    creature = load_files(import_model(tmp_path / "dog.bvh", ImportChoices(apart=False)).files)
-    other = dataclasses.replace(case, loop=treading_loop(creature))
+@pytest.fixture(scope="module")
+def loop_of_bvh(tmp_path_factory: pytest.TempPathFactory) -> WalkLoop:
+    file = tmp_path_factory.mktemp("skeleton") / "dog.bvh"
+    file.write_text(bvh())
+    return treading_loop(load_files(import_model(file, ImportChoices(apart=False)).files))
+
+
+def test_a_skeleton_of_bvh_walks_on_the_same_character(case: Case, loop_of_bvh: WalkLoop):
+    other = dataclasses.replace(case, loop=loop_of_bvh)
     document, name = written(other)
     assert np.ptp(seen(other, document, name), axis=0).max() > 0.01
 

@@ -13,11 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from end_to_end.once import curve_drawn_once, predicted_once, spec_made_once
 from end_to_end.unevolved import Unevolved, unevolved, untried
 from end_to_end.walks import SHORTER
 
 import mjxgait.processes
-from mjxgait.certification import CertificateConfig
+from mjxgait.animation.keys import refine
+from mjxgait.certification import CertificateConfig, advice
+from mjxgait.certification import feasibility as prediction
 from mjxgait.certification.stress import StressConfig
 from mjxgait.cli import main
 from mjxgait.config.tables import build
@@ -26,8 +29,11 @@ from mjxgait.distributed import evolve as board
 from mjxgait.distributed.jobs import Programs
 from mjxgait.distributed.scheduler import LocalBackend
 from mjxgait.experiments.ablation import findings, measures
-from mjxgait.training import loop
+from mjxgait.experiments.repertoire import clips
+from mjxgait.rendering import curves, painter, plots, video
+from mjxgait.training import experiment, loop
 from mjxgait.training.prescreen import Prescreen
+from mjxgait.web import page
 
 CERTIFICATE = CertificateConfig.__init__
 PROGRAMS = Programs()
@@ -38,13 +44,16 @@ PROGRAMS = Programs()
 def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Examine with the shipped code, but few initial conditions and short times by default.
 
-    Study reports use few resamples.
+    Study reports use few resamples, and pictures are coarse and of few seconds.
     """
     _default(monkeypatch, CertificateConfig, build(CertificateConfig, SHORTER, "short"))
     _default(monkeypatch, StressConfig, StressConfig(starts=4, seconds=1.0, long=2.0))
     monkeypatch.setattr(measures, "SECONDS", 0.5)
     monkeypatch.setattr(measures, "STARTS", 2)
     monkeypatch.setattr(findings, "RESAMPLES", 499)
+    for module in (video, plots, page, clips, refine):
+        monkeypatch.setattr(module, "LOOP_SECONDS", 4.0)
+    monkeypatch.setattr(painter, "SMOOTH", 1)
     for module in (mjxgait.processes, measures):
         monkeypatch.setattr(module, "process_per_core", _one_thread)
     monkeypatch.setattr(subprocess, "run", _run_here(subprocess.run))
@@ -53,7 +62,7 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 @pytest.fixture(autouse=True)
 def sketched(request: pytest.FixtureRequest) -> Iterator[pytest.MonkeyPatch]:
-    """Skip the simulation of generations, unless `--thorough` is given."""
+    """Skip the simulation of generations, and repetitions, unless `--thorough` is given."""
     with pytest.MonkeyPatch.context() as patch:
         if not request.config.getoption("--thorough"):
             patch.setattr(loop, "_compiled", unevolved)
@@ -61,6 +70,10 @@ def sketched(request: pytest.FixtureRequest) -> Iterator[pytest.MonkeyPatch]:
             patch.setattr(Prescreen, "begin", lambda prescreen: None)
             patch.setattr(Prescreen, "_program", property(untried))
             patch.setattr(overlap, "SAMPLES", 16)
+            patch.setattr(experiment, "make_spec", spec_made_once)
+            for module in (advice, prediction):
+                patch.setattr(module, "feasibility", predicted_once)
+            patch.setattr(curves, "plot_fitness", curve_drawn_once)
         yield patch
 
 

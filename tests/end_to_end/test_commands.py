@@ -74,7 +74,7 @@ def evolved_and_shown(folder: Path) -> tuple[list[str], str]:
 
 def ranked(folder: Path) -> tuple[list[str], str]:
     run = faller(folder / "run")
-    certify(run)
+    certify(run, short_examination(folder))
     return ["add", str(run), "--board", "board.jsonl"], "board.jsonl"
 
 

@@ -30,11 +30,12 @@ draws = 2
 
 _KNOWN = tomllib.loads(SHORT)
 SHORTER = _KNOWN | {
-    **{"seconds": 1.2, "warmup": 0.3},
-    "pushes": _KNOWN["pushes"] | {"window": [0.4, 0.6], "ladder_seconds": 0.5},
-    **{"hop": {"stay": 0.5}, "limbo": {"stay": 0.5}},
+    **{"seconds": 0.8, "warmup": 0.2},
+    "pushes": _KNOWN["pushes"] | {"window": [0.3, 0.4], "ladder_seconds": 0.3},
+    **{"hop": {"stay": 0.3}, "limbo": {"stay": 0.3}},
+    **{"follow": {"moves": 0.4, "moved": 2}, "wishes": {"commands": 2}},
 }
-"""An examination of 1.2 s; a lamp must be at rest for the last half second."""
+"""An examination of 0.8 s; a lamp must be at rest for the last 0.3 s, and lights move early."""
 
 
 @functools.cache

@@ -106,6 +106,7 @@ def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path
     assert told(imported, "own inertia")
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_the_floor_gives_at_first_touch(tmp_path):
     """A hundredth of the hip height; with MuJoCo's usual impedance loaded feet flicker."""
     for kind, text in (("urdf", BIPED), ("xml", QUADRUPED)):
@@ -348,6 +349,7 @@ def test_joints_are_kept_and_frozen_as_told(tmp_path):
     assert "fl_knee" not in creature.joints.names
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_the_command_writes_a_folder_and_check_draws_it(tmp_path, capsys):
     model = tmp_path / "robot.urdf"
     model.write_text(BIPED)
@@ -387,6 +389,7 @@ def test_check_fails_where_the_creature_does_not_stand(tmp_path, capsys):
     assert "does not stand" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_train_takes_a_model_file(tmp_path):
     model = tmp_path / "robot.xml"
     model.write_text(QUADRUPED)
@@ -394,6 +397,7 @@ def test_train_takes_a_model_file(tmp_path):
     assert creature.name == "robot"
 
 
+@pytest.mark.usefixtures("a_short_search")
 @pytest.mark.parametrize(
     ("stated", "said"),
     [

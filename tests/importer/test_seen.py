@@ -71,6 +71,7 @@ def test_corners_are_read_as_whole_words(name, side):
     assert _named_front(name) == side
 
 
+@pytest.mark.usefixtures("a_short_search")
 @pytest.mark.parametrize("sides", [("l", "r"), ("Left", "Right")])
 def test_names_of_sides_say_the_front_where_the_body_does_not(tmp_path, sides):
     """A six-legged body with legs about upright axes is as good along x as along y."""
@@ -122,6 +123,7 @@ def test_legs_that_sprawl_walk_ahead_and_are_strong_enough_for_their_reach(tmp_p
     assert creature.gains.torque_limit[lift] > 1.5 * creature.gains.torque_limit[swing]
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_a_hinge_mirrors_another_wherever_its_anchor_lies_on_its_axis(tmp_path):
     """All servos have their frames on their left: the left hinges lie farther out."""
     legs = "".join(
@@ -340,6 +342,7 @@ def test_angles_are_in_radians_where_degrees_would_leave_no_room(tmp_path, limit
     assert creature.joints.pose_high.max() > 0.3
 
 
+@pytest.mark.usefixtures("a_short_search")
 def test_a_shin_of_which_only_the_foot_is_drawn_is_drawn_whole(tmp_path):
     """Some files draw meshes, and for a shin without one only its foot."""
     shin = '<geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/></body></body>'
