@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import functools
 
 import numpy as np
 from end_to_end.unevolved import embodied
@@ -28,6 +29,7 @@ def remembers(body, champion):
     return bool(kept & set(brain.driver.tolist()))
 
 
+@functools.cache
 def with_a_brain(task):
     """The first of a first population that the light and a neuron with a memory move, and its body."""
     table = {

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers import made_up_certificate
 from rendering.made_up import treading, write_run
-from web.browser import canvas, drawn, is_blank, wait_until, watched_tab
+from web.browser import canvas, drawn, is_blank, new_tab, wait_until, watched_tab
 
 from mjxgait.certification import Certificate, CertificateConfig, Criterion, Measure
 from mjxgait.certification.stress import Stress, StressConfig, Trial
@@ -152,7 +152,7 @@ def pressed(tab):
 
 
 def test_the_page_fits_a_phone(browser, page):
-    tab = browser.new_page(viewport={"width": 390, "height": 844})
+    tab = new_tab(browser, 390, 844)
     tab.goto(page.as_uri())
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
     tab.close()
@@ -164,7 +164,7 @@ def test_a_blank_canvas_is_noticed(browser, page, tmp_path):
     start = text.index("base64,", text.index("data:model/gltf-binary")) + len("base64,")
     end = text.index('"', start)
     (tmp_path / "broken.html").write_text(text[:start] + text[end:], encoding="utf-8")
-    tab = browser.new_page()
+    tab = new_tab(browser, 900, 700)
     tab.goto((tmp_path / "broken.html").as_uri())
     with pytest.raises(AssertionError, match="blank"):
         drawn(tab, seconds=1.5)

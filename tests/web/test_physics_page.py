@@ -11,7 +11,7 @@ import pytest
 from helpers import said_by
 from rendering.made_up import falling, treading, write_run
 from web.brains import with_a_brain
-from web.browser import drawn, wait_until, watched_tab
+from web.browser import drawn, new_tab, wait_until, watched_tab
 from web.engine import engine_folder
 
 from mjxgait.creature.ground.spec import parse_ground
@@ -120,7 +120,7 @@ def test_a_slope_makes_it_slide(tab):
 def test_it_fits_a_phone_and_answers_a_finger(browser, page, tab):
     # An animated page takes more than a core; a paused one takes none.
     tab.keyboard.press(" ")
-    tab = browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    tab = new_tab(browser, 390, 844, has_touch=True, is_mobile=True)
     tab.goto(page.as_uri())
     wait_until(tab, STARTED)
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
