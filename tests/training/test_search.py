@@ -75,6 +75,8 @@ def test_a_run_that_begins_again_is_resumed_with_the_same_bits(
     def again(generations: int) -> Config:
         plain = config(generations)
         own: dict[str, Any] = {"search": search, "restart": RestartConfig(every=3, below=1e9)}
+        if search == "ga":
+            own["population"] = 6  # the programs of `test_run.SMALL`, so the cache has them
         return dataclasses.replace(plain, evolution=dataclasses.replace(plain.evolution, **own))
 
     straight = train(tmp_path / "straight", stool, again(5))

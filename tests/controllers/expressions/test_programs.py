@@ -81,10 +81,10 @@ def _mutants(keys: jax.Array, code: jax.Array, value: jax.Array, shares: jax.Arr
     return jax.vmap(lambda key: mutated(key, (code, value), WORDS, settings))(keys)
 
 
-def mutants(keys: jax.Array, tree: Any, shares: jax.Array) -> tuple[np.ndarray, np.ndarray]:
+def mutants(tree: Any, shares: jax.Array, count: int = 1000) -> tuple[np.ndarray, np.ndarray]:
     """Mutants [N, C] of one tree [C]; `shares`: the share of each kind of mutation."""
-    code, value = _mutants(keys, *map(jnp.asarray, tree), shares)
-    return np.asarray(code), np.asarray(value)
+    code, value = _mutants(jax.random.split(key_of(0), 1000), *map(jnp.asarray, tree), shares)
+    return np.asarray(code)[:count], np.asarray(value)[:count]
 
 
 TAKEN = np.asarray(ARITY).tolist()
@@ -305,11 +305,10 @@ def test_crossover_prefers_functions():
 
 def test_each_mutation_changes_what_its_name_says():
     tree = to_arrays("(+ (* a0 0.5) (ifltz a1 a2 a3))", KNOWN, NODES, "x")
-    keys = jax.random.split(key_of(0), 256)
 
     def all_of(kind: str) -> set[str]:
-        rows = zip(*mutants(keys, tree, jnp.array([one == kind for one in KINDS])), strict=True)
-        return {to_text(*row, KNOWN) for row in rows}
+        shares = jnp.array([one == kind for one in KINDS], jnp.float32)
+        return {to_text(*row, KNOWN) for row in zip(*mutants(tree, shares, 256), strict=True)}
 
     assert all(text.startswith("(+ (* a0 ") for text in all_of("constant"))
     assert len(all_of("constant")) > 30
@@ -324,11 +323,10 @@ def test_each_mutation_changes_what_its_name_says():
 def test_a_nudge_changes_a_program_little():
     """Nudges of one observation: `a0` plus a small number, or times a number near 1."""
     tree = to_arrays("a0", KNOWN, NODES, "x")
-    keys = jax.random.split(key_of(0), 1000)
 
-    code, value = mutants(keys, tree, jnp.array([0, 0, 0, 0, 1]))
+    code, value = mutants(tree, jnp.array([0.0, 0.0, 0.0, 0.0, 1.0]))
     sums, products = (code[:, 0] == FUNCTION_CODES[name] for name in "+*")
-    assert sums.sum() + products.sum() == len(keys)
+    assert sums.sum() + products.sum() == len(code) == 1000
     assert 0.4 < sums.mean() < 0.6
     by = abs(np.where(sums, value[:, 2], value[:, 2] - 1.0))
     assert by.max() < 5 * 0.2

@@ -88,9 +88,15 @@ def tuning(**genes: float) -> jax.Array:
     return jnp.array([values[name] for name in TUNING])
 
 
+@jax.jit
+def target_at(cycle: jax.Array, position: int) -> jax.Array:
+    """Target pose [J] at a position of a cycle of 6 poses with 4 steps between neighbours."""
+    return interpolate(cycle, position, 4, 6)
+
+
 def test_the_cycle_meets_key_poses_and_mirror_images_exactly(shipped: Creature):
     poses = random_poses(shipped)
-    cycle = pose_cycle(shipped, jnp.asarray(poses))
+    cycle = jax.jit(lambda own: pose_cycle(shipped, own))(poses)
     mirrored = (
         shipped.mirror.sign * poses[:, shipped.mirror.partner]
         if shipped.mirror.symmetric
@@ -98,7 +104,7 @@ def test_the_cycle_meets_key_poses_and_mirror_images_exactly(shipped: Creature):
     )
     assert len(cycle) == len(poses) + len(mirrored)
     for i, pose in enumerate([*poses, *mirrored]):
-        assert np.allclose(interpolate(cycle, jnp.int32(i * 4), 4, 6), pose, atol=1e-6)
+        assert np.allclose(target_at(cycle, i * 4), pose, atol=1e-6)
 
 
 def test_the_cycle_is_periodic_and_piecewise_linear(stool: Creature):
@@ -106,8 +112,8 @@ def test_the_cycle_is_periodic_and_piecewise_linear(stool: Creature):
     for s in range(24):
         a, f = s // 4, (s % 4) / 4
         expected = (1 - f) * np.asarray(cycle[a]) + f * np.asarray(cycle[(a + 1) % 6])
-        assert np.allclose(interpolate(cycle, jnp.int32(s), 4, 6), expected, atol=1e-6)
-        assert np.allclose(interpolate(cycle, jnp.int32(s + 24), 4, 6), expected, atol=1e-5)
+        assert np.allclose(target_at(cycle, s), expected, atol=1e-6)
+        assert np.allclose(target_at(cycle, s + 24), expected, atol=1e-5)
 
 
 def test_an_asymmetric_creature_is_not_mirrored(stool: Creature):
@@ -137,11 +143,16 @@ def test_in_phase_left_and_right_move_together(shipped: Creature):
     variation = tracker(shipped).variation(
         PoseConfig(mirror=False, key_poses=4, in_phase=True), EvolutionConfig()
     )
-    first = variation.create(jax.random.key(0), 2)
-    mother, father = (jax.tree.map(lambda leaf, i=i: leaf[i], first) for i in range(2))
-    mutant = variation.mutate(jax.random.key(1), mother)
+
+    @jax.jit
+    def bred() -> tuple[Genome, Genome, Genome]:
+        first = variation.create(jax.random.key(0), 2)
+        mother, father = (jax.tree.map(lambda leaf, i=i: leaf[i], first) for i in range(2))
+        mutant = variation.mutate(jax.random.key(1), mother)
+        return mother, mutant, variation.cross(jax.random.key(2), mother, father)
+
+    mother, mutant, child = jax.device_get(bred())
     assert np.any(mutant.key_poses != mother.key_poses)
-    child = variation.cross(jax.random.key(2), mother, father)
     for genome in (mother, mutant, child):
         poses = np.asarray(genome.key_poses)
         assert np.ptp(poses, axis=0).max() > 0.1
@@ -307,10 +318,14 @@ def test_targets_keep_to_the_joint_ranges(stool: Creature):
 
 
 def test_without_genes_there_is_no_correction(shipped: Creature):
-    tipped = sensed(shipped, shipped.joints.stand, turned(0, 0.3) @ turned(2, 0.4), 0.3)
-    assert not np.any(
-        corrections(shipped, tuning(), jnp.asarray(shipped.joints.stand + 0.2, jnp.float32), tipped)
-    )
+    @jax.jit
+    def found(genes: jax.Array, target: np.ndarray) -> jax.Array:
+        tipped = sensed(shipped, shipped.joints.stand, turned(0, 0.3) @ turned(2, 0.4), 0.3)
+        return corrections(shipped, genes, target, tipped)
+
+    target = np.asarray(shipped.joints.stand + 0.2, np.float32)
+    assert not np.any(found(tuning(), target))
+    assert np.any(found(tuning(steer=1.0, pitch=1.0, roll=1.0), target))
 
 
 def test_genes_and_bounds_have_the_order_of_the_config(stool: Creature):
