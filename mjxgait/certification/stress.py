@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.trials import common, simulate
+from mjxgait.certification.trials import Draw, common, simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -110,12 +110,14 @@ def stress(
     config: StressConfig | None = None,
     tell: Callable[[str], object] = lambda name: None,
     hasty: bool = False,
+    draw: Draw | None = None,
 ) -> Stress:
     """Test a walking champion beyond the certificate, one disturbance at a time.
 
     Args:
       tell: called with the name of each trial before it runs.
       hasty: stops after the first failed trial; the longest is the last.
+      draw: of starts and pushes; the one shared by all champions if left out.
 
     Raises:
       UserError: the task is not `walk`.
@@ -126,7 +128,7 @@ def stress(
             "examines it"
         )
     config, found = config or StressConfig(), []
-    for name, tried in _trials(creature, champion, config):
+    for name, tried in _trials(creature, champion, config, draw):
         tell(name)
         done = [_done(creature, outcome) for outcome in tried()]
         share = float(np.concatenate(done).mean())
@@ -137,10 +139,10 @@ def stress(
 
 
 def _trials(
-    creature: Creature, champion: Champion, config: StressConfig
+    creature: Creature, champion: Champion, config: StressConfig, draw: Draw | None
 ) -> Iterator[tuple[str, Callable[[], list[Outcome]]]]:
     """Yield the name of each trial and the function that simulates it."""
-    rng = common(CertificateConfig()).generator
+    rng = (draw or common(CertificateConfig())).generator
     plain = perturbed_starts(creature, config.starts, rng(0))
 
     def walked(

@@ -7,9 +7,17 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from mjxgait.certification import Certificate, NominalCheck, certify, nominal_check, trial_run
+from mjxgait.certification import (
+    Certificate,
+    CertificateConfig,
+    NominalCheck,
+    certify,
+    nominal_check,
+    trial_run,
+)
 from mjxgait.certification.acceptance import acceptance_of, promising
-from mjxgait.certification.stress import Stress, stress
+from mjxgait.certification.stress import Stress, StressConfig, stress
+from mjxgait.certification.trials import own
 from mjxgait.champion import Champion
 from mjxgait.config.schema import ExaminationConfig
 from mjxgait.errors import listed
@@ -21,6 +29,8 @@ from mjxgait.training.prescreen import Prescreen
 
 SURER = 4
 """Factor on the starts of a validation after an examination that failed."""
+REHEARSAL = StressConfig(starts=16, long=StressConfig.seconds)
+"""Stress tests of a validation: fewer starts, and no ten minutes."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -141,10 +151,26 @@ class Examiner:
         if self.exams.attempt(name, generation) >= config.examination.attempts:
             return None
         seen = self._validated(champion, wanted, beaten=wanted)
-        if seen.margin >= wanted and (examined := self._examine(seen, hasty=True)).passed:
+        ready = seen.margin >= wanted and self._rehearsed(champion)
+        if ready and (examined := self._examine(seen, hasty=True)).passed:
             return examined
-        self._margins[known] = seen.margin
+        # Nothing that failed beyond the margin is tried again.
+        self._margins[known] = seen.margin if seen.margin < wanted else -np.inf
         return None
+
+    def _rehearsed(self, champion: Champion) -> bool:
+        """Return whether a champion passes the stress tests on a draw of its own, if they decide.
+
+        An attempt costs a certificate and is one of few; a walk that falls on slopes wastes it.
+        """
+        if not self._goes_anywhere:
+            return True
+        body, draw = champion.embodied(self.experiment.creature), own(champion, CertificateConfig())
+        return stress(body, champion, REHEARSAL, hasty=True, draw=draw).passed
+
+    @property
+    def _goes_anywhere(self) -> bool:
+        return self.experiment.config.examination.level == "anywhere"
 
     def best(self, state: EvolutionState) -> Examined | None:
         """Return one of the best few with its certificate, passed or not; None if there are none.
@@ -215,7 +241,7 @@ class Examiner:
         self.examines.set()
         certificate = certify(body, seen.champion, seen=seen.nominal_check, attempts=attempt)
         beyond = None
-        if certificate.passed and self.experiment.config.examination.level == "anywhere":
+        if certificate.passed and self._goes_anywhere:
             self.tell("It walks; does it walk anywhere?")
             beyond = stress(body, seen.champion, hasty=hasty)
             self.tell("\n".join(beyond.rows()))

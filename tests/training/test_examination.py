@@ -255,13 +255,14 @@ def test_individuals_with_equal_fitness_are_one_candidate(experiment):
 
 
 class RequestedTrials:
-    """Scripted results of the second level, and whether each call was hasty."""
+    """Scripted results of the second level, and whether each call was hasty and a rehearsal."""
 
     def __init__(self, *shares: float) -> None:
-        self.shares, self.hasty = list(shares), list[bool]()
+        self.shares, self.hasty, self.rehearsed = list(shares), list[bool](), list[bool]()
 
-    def __call__(self, *_: object, hasty: bool) -> Stress:
+    def __call__(self, *_: object, hasty: bool, draw: object = None) -> Stress:
         self.hasty.append(hasty)
+        self.rehearsed.append(draw is not None)
         share = self.shares.pop(0)
         return Stress("", (Trial("friction 0.4", share, share >= 0.9),), StressConfig())
 
@@ -270,7 +271,7 @@ def test_level_anywhere_ends_the_run_only_if_the_stress_test_passes(
     experiment, validations, exams, monkeypatch: pytest.MonkeyPatch
 ):
     """The certificate alone ends no run; if it fails, no stress test follows."""
-    requested = RequestedTrials(0.5, 0.95)
+    requested = RequestedTrials(0.9, 0.5, 0.95, 0.95)
     monkeypatch.setattr(examination, "stress", requested)
     anywhere = {"level": "anywhere", "attempts": 4}
     state = state_with(experiment, 3)
@@ -281,7 +282,21 @@ def test_level_anywhere_ends_the_run_only_if_the_stress_test_passes(
     assert examined.beyond is not None
     validations.certificates = [-0.1]
     assert not examiner(experiment, exams, **anywhere).best(ranked(experiment)).passed
-    assert requested.hasty == [True, True]
+    assert requested.hasty == [True, True, True, True]
+    assert requested.rehearsed == [True, False, True, False]
+
+
+def test_a_failed_rehearsal_of_the_stress_tests_takes_no_attempt(
+    experiment, validations, exams, monkeypatch: pytest.MonkeyPatch
+):
+    """It is neither examined nor rehearsed again."""
+    requested = RequestedTrials(0.5)
+    monkeypatch.setattr(examination, "stress", requested)
+    anywhere, state = examiner(experiment, exams, level="anywhere"), state_with(experiment, 3)
+    assert anywhere.early(state) is None
+    assert anywhere.early(state) is None
+    assert "exam" not in validations.requested
+    assert requested.rehearsed == [True]
 
 
 def test_at_the_end_the_whole_second_level_is_tested(
