@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 from controllers.sims_brain.made_up import LANES, bodies_of, one, random_graphs
-from physics.test_blocks_physics import IN_WATER, in_mujoco, moments
+from physics.test_blocks_physics import CAPACITY, IN_WATER, in_mujoco, moments
 
 from mjxgait.controllers.sims_brain.genotype import Graph
 from mjxgait.physics.batched_trees.plant import TreePlant
@@ -18,7 +18,7 @@ def graphs() -> Graph:
 
 
 def test_the_reference_water_equals_that_of_evolution(graphs: Graph):
-    bodies = bodies_of(graphs)
+    bodies = bodies_of(graphs, CAPACITY)
     state = moments(bodies, 1.0)
     wet = np.asarray(jax.jit(lambda s: TreePlant(IN_WATER).forward(s)[1].bias)(state))
     for lane in range(LANES):

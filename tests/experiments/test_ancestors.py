@@ -17,6 +17,8 @@ from mjxgait.api.multi_seed import evolve_seeds
 from mjxgait.config.schema import Config
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.creature import Creature
+from mjxgait.distributed import scheduler
+from mjxgait.distributed.jobs import Programs
 from mjxgait.distributed.rows import Rows
 from mjxgait.errors import UserError
 from mjxgait.experiments.ancestors import (
@@ -40,8 +42,11 @@ FEW = {"runs": 2, "task": "walk", "population": 4, "generations": 2}
 
 @pytest.fixture(scope="module", autouse=True)
 def nothing_is_simulated() -> Iterator[None]:
+    """All ancestors share their compiled programs, as in a process that evolves several runs."""
+    programs = Programs()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stages, "evaluate", made_up_evaluate)
+        patch.setattr(scheduler, "Programs", lambda: programs)
         yield
 
 

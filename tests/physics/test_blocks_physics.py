@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from controllers.sims_brain.made_up import CAPACITY, LANES, bodies_of, genome_of, one, random_graphs
+from controllers.sims_brain.made_up import LANES, bodies_of, genome_of, one, random_graphs
 
-from mjxgait.controllers.sims_brain.genotype import Graph
+from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
 from mjxgait.controllers.sims_brain.phenotype import Body
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.controllers.sims_brain.reference_files import body_xml
@@ -23,6 +23,8 @@ from mjxgait.tasks.modular.follow import Following, Light
 from mjxgait.tasks.starts import NEVER
 from mjxgait.types import BodyState
 
+CAPACITY = Capacity(parts=6, links=6)
+"""Half of the usual one: the compiler takes several times as long for a step of twelve links."""
 ON_LAND = Surroundings(contact=0.01, iterations=20, line_iterations=20, lit=True)
 IN_WATER = Surroundings(floor=False, gravity=0.0, drag=300.0)
 
@@ -53,7 +55,7 @@ def graphs() -> Graph:
 
 @pytest.fixture(scope="module")
 def bodies(graphs: Graph) -> Body:
-    return bodies_of(graphs)
+    return bodies_of(graphs, CAPACITY)
 
 
 def model_of(graph: Graph, around: Surroundings) -> mujoco.MjModel:

@@ -15,7 +15,7 @@ from mjxgait.controllers.sims_brain.reference_body import CUBE, CUBE_DENSITY
 from mjxgait.physics.batched_trees.arena import cube_tree, resting
 from mjxgait.physics.batched_trees.collision import Boxes, gap, pushes
 from mjxgait.physics.batched_trees.dynamics import weighed
-from mjxgait.physics.lane_major.lanes import pinned_by, separate_kernels
+from mjxgait.physics.lane_major.lanes import pinned_by
 from mjxgait.plugins.registry import build_config
 from mjxgait.reference.contest import contest_of
 from mjxgait.simulation.episode import first_body
@@ -51,9 +51,12 @@ def boxes(seed: int, count: int, apart: float = 0.3) -> Boxes:
     )
 
 
+PUSHES = jax.jit(lambda one, other: pushes(one, other, STEP, pinned_by(one.mass[0])))
+
+
 def pushed(one: Boxes, other: Boxes) -> tuple[np.ndarray, np.ndarray]:
     """Moments and forces, [n, 6, L] and [m, 6, L]."""
-    first, second = jax.jit(lambda a, b: pushes(a, b, STEP, pinned_by(a.mass[0])))(one, other)
+    first, second = PUSHES(one, other)
     return np.asarray(first), np.asarray(second)
 
 
@@ -91,7 +94,7 @@ def test_blocks_that_approach_are_pushed_apart_and_slowed():
 
 
 def test_blocks_that_are_apart_or_missing_push_nothing():
-    one, other = boxes(4, 2, 0.1), boxes(5, 2, 0.1)
+    one, other = boxes(4, 3, 0.1), boxes(5, 2, 0.1)
     far = dataclasses.replace(other, middle=(other.middle[0] + 3.0, *other.middle[1:]))
     assert not np.abs(pushed(one, far)[0]).any()
     missing = dataclasses.replace(other, solid=jnp.zeros((2, LANES)))
@@ -139,7 +142,7 @@ def test_the_gap_is_the_distance_to_the_nearest_block():
 
 def test_the_cube_weighs_as_any_body_of_its_shape():
     cube = cube_tree(CUBE, CUBE_DENSITY)
-    known = weighed(cube)
+    known = jax.jit(weighed)(cube)
     np.testing.assert_allclose(cube.body_weight[:1], known.body_weight[:1], rtol=1e-5)
     np.testing.assert_allclose(cube.dof_weight[:1], known.dof_weight[:1], rtol=1e-5)
     assert float(cube.mass.sum()) == pytest.approx(CUBE_DENSITY * CUBE**3)
@@ -174,37 +177,67 @@ def contest() -> SimpleNamespace:
     known = dataclasses.replace(state, genomes=own, fitness=blank[0, 0], terms=blank, outcome=blank)
     creature = experiment.champion(known, {}).embodied(blocks)
     start = jax.tree.map(lambda leaf: leaf[0], experiment.starts)
-    body = first_body(experiment.simulator.bodies(met, start))
+    body = first_body(jax.jit(experiment.simulator.bodies)(met, start))
     return SimpleNamespace(plant=experiment.simulator.plant, body=body, creature=creature)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_pushes_are_the_joints_forces_that_mujoco_computes_from_them(
-    contest: SimpleNamespace, seed: int
-):
-    """Bodies and cube thrown into each other: generalised forces, and distances from the cube."""
-    rng, model = np.random.default_rng(seed), contest.creature.model
+SEEDS = range(3)
+
+
+@pytest.fixture(scope="module")
+def thrown(contest: SimpleNamespace) -> list[SimpleNamespace]:
+    """Bodies and cube thrown into each other, once per seed: states, and evolution's step.
+
+    after: the next states; alone: without the pushes; moved: the body's with them as torques.
+    """
     states = [contest.body, contest.body.ground.opponent, contest.body.ground.cube]
     hinges = [np.flatnonzero(np.asarray(state.parameters.moves)[1:] > 0) for state in states]
-    thrown = [_thrown(rng, *pair) for pair in zip(states, hinges, strict=True)]
-    arena = dataclasses.replace(contest.body.ground, opponent=thrown[1], cube=thrown[2])
-    lane = jax.tree.map(
-        lambda leaf: jnp.asarray(leaf)[..., None], dataclasses.replace(thrown[0], ground=arena)
-    )
-    plant, still = contest.plant, jnp.zeros_like(lane.qvel)
-    with separate_kernels():
-        sensed, moment = plant.forward(lane)
-        after = plant.advance(lane, moment, still)
-        loose = dataclasses.replace(moment, push=jax.tree.map(jnp.zeros_like, moment.push))
-        alone, moved = (plant.advance(lane, loose, t) for t in (still, moment.push[0]))
-    np.testing.assert_allclose(after.qvel, moved.qvel, rtol=1e-3, atol=1e-3)
-    three = [(one, one.ground.opponent, one.ground.cube) for one in (after, alone)]
-    for one, other, push in zip(*three, moment.push, strict=True):
+    each = []
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        each.append([_thrown(rng, *pair) for pair in zip(states, hinges, strict=True)])
+    lanes = [
+        dataclasses.replace(
+            own, ground=dataclasses.replace(contest.body.ground, opponent=other, cube=cube)
+        )
+        for own, other, cube in each
+    ]
+    lane = jax.tree.map(lambda *leaves: jnp.stack(leaves, axis=-1), *lanes)
+    plant = contest.plant
+    sensed, moment = jax.jit(plant.forward)(lane)
+    advance, still = jax.jit(plant.advance), jnp.zeros_like(lane.qvel)
+    loose = dataclasses.replace(moment, push=jax.tree.map(jnp.zeros_like, moment.push))
+    found = {
+        "sensed": sensed,
+        "push": moment.push,
+        "after": advance(lane, moment, still),
+        "alone": advance(lane, loose, still),
+        "moved": advance(lane, loose, moment.push[0]),
+    }
+    return [
+        SimpleNamespace(
+            states=own,
+            hinges=hinges,
+            **jax.tree.map(lambda leaf, at=seed: np.asarray(leaf)[..., at : at + 1], found),
+        )
+        for seed, own in zip(SEEDS, each, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_pushes_are_the_joints_forces_that_mujoco_computes_from_them(
+    contest: SimpleNamespace, thrown: list[SimpleNamespace], seed: int
+):
+    """Bodies and cube thrown into each other: generalised forces, and distances from the cube."""
+    model, own = contest.creature.model, thrown[seed]
+    np.testing.assert_allclose(own.after.qvel, own.moved.qvel, rtol=1e-3, atol=1e-3)
+    three = [(one, one.ground.opponent, one.ground.cube) for one in (own.after, own.alone)]
+    for one, other, push in zip(*three, own.push, strict=True):
         assert (np.abs(one.qvel - other.qvel).max() > 0.01) == (np.abs(push).max() > 1)
     data = mujoco.MjData(model)
-    places = [np.append(np.arange(7), 7 + moves) for moves in hinges]
-    dofs = [np.append(np.arange(6), 6 + moves) for moves in hinges]
-    pairs = zip(thrown, places, dofs, strict=True)
+    places = [np.append(np.arange(7), 7 + moves) for moves in own.hinges]
+    dofs = [np.append(np.arange(6), 6 + moves) for moves in own.hinges]
+    pairs = zip(own.states, places, dofs, strict=True)
     poses, speeds = zip(*((s.qpos[p], s.qvel[d]) for s, p, d in pairs), strict=True)
     data.qpos[:], data.qvel[:] = np.concatenate(poses), np.concatenate(speeds)
     mujoco.mj_forward(model, data)
@@ -212,11 +245,11 @@ def test_pushes_are_the_joints_forces_that_mujoco_computes_from_them(
     assert found is not None
     geoms = [*found.geoms, np.array([found.cube])]
     expected = _applied(model, data, geoms)
-    mine = np.concatenate([np.asarray(p)[d, 0] for p, d in zip(moment.push, dofs, strict=True)])
+    mine = np.concatenate([p[d, 0] for p, d in zip(own.push, dofs, strict=True)])
     assert np.abs(expected).max() > 10
     np.testing.assert_allclose(mine, expected, atol=1e-4 * np.abs(expected).max())
     gaps = found.gaps(data.geom_xpos[None], data.geom_xmat[None])[0]
-    np.testing.assert_allclose(np.asarray(sensed.body.gaps)[:, 0], gaps, atol=1e-5)
+    np.testing.assert_allclose(own.sensed.body.gaps[:, 0], gaps, atol=1e-5)
 
 
 def _thrown(rng: np.random.Generator, state: BodyState, hinges: np.ndarray) -> BodyState:
@@ -235,10 +268,8 @@ def _applied(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[np.ndarray]
     each = [_seen(model, data, own) for own in geoms]
     force, found = [np.zeros((len(own), 6)) for own in geoms], np.zeros(model.nv)
     for i, j in ((0, 1), (0, 2), (1, 2)):
-        for k, more in zip(
-            (i, j), pushes(each[i], each[j], STEP, pinned_by(jnp.ones(1))), strict=True
-        ):
-            force[k] += np.asarray(more)[:, :, 0]
+        for k, more in zip((i, j), pushed(each[i], each[j]), strict=True):
+            force[k] += more[:, :, 0]
     for own, pulls in zip(geoms, force, strict=True):
         for geom, pull in zip(own, pulls, strict=True):
             body, place = int(model.geom_bodyid[geom]), data.geom_xpos[geom]

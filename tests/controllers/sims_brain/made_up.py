@@ -1,6 +1,7 @@
 """Helpers for the tests of modular bodies."""
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import jax
@@ -21,7 +22,6 @@ from mjxgait.types import Sensed
 CAPACITY, LANES = Capacity(), 96
 """Capacity and number of random bodies; with these, all tests share compiled programs."""
 _draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
-_embody = jax.jit(jax.vmap(lambda graph: body_of(graph, CAPACITY)))
 
 
 def random_graphs(seed: int) -> Graph:
@@ -29,9 +29,10 @@ def random_graphs(seed: int) -> Graph:
     return _draw(jax.random.split(key_of(seed), LANES))
 
 
-def bodies_of(graphs: Graph) -> Body:
+@partial(jax.jit, static_argnums=1)
+def bodies_of(graphs: Graph, capacity: Capacity = CAPACITY) -> Body:
     """Bodies of graphs [LANES]."""
-    return _embody(graphs)
+    return jax.vmap(lambda graph: body_of(graph, capacity))(graphs)
 
 
 def one(tree: Any, place: int) -> Any:

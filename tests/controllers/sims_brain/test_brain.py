@@ -1,6 +1,8 @@
 """Brains as arrays give the same outputs as a plain network, for any genes."""
 
-from functools import cache, partial
+import dataclasses
+from functools import cache
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,11 +13,8 @@ from controllers.sims_brain.made_up import one
 from mjxgait.controllers.sims_brain.brain import Brain, Perceived, blank, fired, thought, wired
 from mjxgait.controllers.sims_brain.genotype import (
     Capacity,
-    Graph,
     NerveRoom,
     Ranges,
-    random_centre,
-    random_nerves,
 )
 from mjxgait.controllers.sims_brain.operators import Genotype, Kin
 from mjxgait.controllers.sims_brain.phenotype import Body, body_of
@@ -29,6 +28,22 @@ from mjxgait.training.experiment import arrays_of
 CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(steer=True, skills=3), 200, 0.01
 KIN = Kin(CAPACITY, ROOM, Ranges())
 FIRED = jax.jit(fired, static_argnums=3)
+CREATE = jax.jit(jax.vmap(KIN.create))
+THINK = jax.jit(jax.vmap(lambda brain, mind, seen, skill: thought(brain, mind, seen, STEP, skill)))
+NEURONS_IN_ALL = CAPACITY.parts * ROOM.local + ROOM.central
+
+
+@jax.jit
+@jax.vmap
+def born(genotype: Genotype) -> tuple[Body, Brain]:
+    """Bodies and brains of genotypes [COUNT]; all tests share these programs."""
+    body = body_of(genotype.graph, CAPACITY)
+    return body, wired(genotype.nerves, genotype.centre, body, ROOM)
+
+
+def drawn(seed: int) -> Genotype:
+    """Random genotypes [COUNT]."""
+    return jax.device_get(CREATE(jax.random.split(key_of(seed), COUNT)))
 
 
 @pytest.mark.parametrize("name", NEURONS)
@@ -56,17 +71,10 @@ def test_any_input_gives_a_finite_value():
 
 def test_a_brain_matches_its_reference_controller():
     """The two may differ where a threshold is met within rounding, in fewer than 3 % of brains."""
-
-    def make(key: jax.Array):
-        genotype = KIN.create(key)
-        body = body_of(genotype.graph, CAPACITY)
-        return genotype, body, wired(genotype.nerves, genotype.centre, body, ROOM)
-
-    genotypes, bodies, brains = jax.jit(jax.vmap(make))(jax.random.split(key_of(3), COUNT))
+    genotypes = drawn(3)
+    bodies, brains = jax.device_get(born(genotypes))
     skills = np.arange(COUNT) % ROOM.skills
-    think = jax.jit(jax.vmap(lambda b, m, p, s: thought(b, m, p, STEP, s)))
-    neurons = CAPACITY.parts * ROOM.local + ROOM.central
-    minds = jax.vmap(lambda _: blank(neurons))(jnp.arange(COUNT))
+    minds = repeated(blank(NEURONS_IN_ALL))
     links, references = zip(
         *(reference(one(genotypes, i), one(bodies, i), skills[i]) for i in range(COUNT)),
         strict=True,
@@ -77,7 +85,7 @@ def test_a_brain_matches_its_reference_controller():
         angles = np.float32(rng.uniform(-1, 1, (COUNT, CAPACITY.links)))
         contact = np.float32(rng.integers(0, 2, (COUNT, CAPACITY.links)))
         light = np.float32(rng.normal(size=(COUNT, CAPACITY.links, 3)))
-        torque, minds = think(brains, minds, Perceived(angles, contact, light), skills)
+        torque, minds = THINK(brains, minds, Perceived(angles, contact, light), skills)
         for i in np.flatnonzero([len(found) > 0 for found in links]):
             last = one(bodies, i).parts.last[: len(references[i].parts)]
             senses = {
@@ -103,10 +111,15 @@ def test_the_reference_brains_values_and_memory_are_separate_arrays():
     assert (first["memory"] == 0).all()
 
 
+def repeated(tree: Any) -> Any:
+    """One of COUNT that are all alike."""
+    return jax.tree.map(lambda leaf: np.repeat(np.asarray(leaf)[None], COUNT, axis=0), tree)
+
+
 @cache
 def some() -> Genotype:
     """Thirty random genotypes."""
-    return jax.vmap(KIN.create)(jax.random.split(key_of(11), 30))
+    return jax.tree.map(lambda leaf: leaf[:30], drawn(11))
 
 
 def test_each_skill_has_effectors_of_its_own():
@@ -189,22 +202,17 @@ def test_mirrored_limbs_have_mirrored_torques():
     """Both limbs of a pair have mirrored observations and the same neurons."""
     from controllers.sims_brain.test_growth import moving, star
 
-    @jax.jit
-    def born(graph: Graph) -> tuple[Body, Brain]:
-        body = body_of(graph, CAPACITY)
-        nerves = random_nerves(key_of(5), CAPACITY.nodes, ROOM)
-        return body, wired(nerves, random_centre(key_of(6), ROOM), body, ROOM)
-
-    body, brain = born(star(mirror=2, joint="universal"))
+    genotypes = dataclasses.replace(drawn(5), graph=repeated(star(mirror=2, joint="universal")))
+    bodies, brains = jax.device_get(born(genotypes))
+    body = one(bodies, 0)
     sign, copies = np.asarray(body.sign), np.asarray(body.parts.copies)[np.asarray(body.part)]
     bent = np.where(moving(body), 0.3 + 0.1 * np.asarray(body.hinge), 0.0) * sign
     ahead = np.where(copies[:, None] > 0, [0.2, -0.4, 0.1], [0.2, 0.4, 0.1])
-    perceived = Perceived(jnp.float32(bent), jnp.zeros(CAPACITY.links), jnp.float32(ahead))
-    mind = blank(CAPACITY.parts * ROOM.local + ROOM.central)
-    think = jax.jit(partial(thought, step=STEP))
+    seen = Perceived(np.float32(bent), np.zeros(CAPACITY.links, np.float32), np.float32(ahead))
+    perceived, minds = repeated(seen), repeated(blank(NEURONS_IN_ALL))
     for _ in range(3):
-        torque, mind = think(brain, mind, perceived)
+        torques, minds = THINK(brains, minds, perceived, np.zeros(COUNT, int))
     left, right = (np.flatnonzero(moving(body) & (copies == image)) for image in (0, 1))
-    np.testing.assert_allclose(
-        np.asarray(torque)[left] * sign[left], np.asarray(torque)[right] * sign[right], rtol=1e-5
-    )
+    torque = np.asarray(torques) * sign
+    np.testing.assert_allclose(torque[:, left], torque[:, right], rtol=1e-5)
+    assert (torque[:, left] != 0).any(0).all()

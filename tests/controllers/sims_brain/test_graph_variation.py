@@ -3,10 +3,9 @@
 import dataclasses
 from collections.abc import Callable
 from functools import cache
-from typing import Literal
+from typing import Any, Literal
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from controllers.sims_brain.made_up import one
@@ -36,7 +35,7 @@ GROWN = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))
 def parents() -> tuple[Genotype, Genotype]:
     create = jax.jit(jax.vmap(KIN.create))
     first, second = (create(jax.random.split(key_of(seed), COUNT)) for seed in (0, 1))
-    return first, second
+    return jax.device_get((first, second))
 
 
 @cache
@@ -45,9 +44,22 @@ def breeder(name: str) -> Callable[..., Genotype]:
     return jax.jit(jax.vmap(getattr(KIN, name)))
 
 
-def children(name: str, parents: tuple[Genotype, Genotype], seed: int = 2) -> Genotype:
+@jax.jit
+def _mutated(rates: tuple[Any, ...], keys: jax.Array, mothers: Genotype) -> Genotype:
+    """Rates are traced, as in a run, so that all share a program."""
+    return jax.vmap(Kin(CAPACITY, ROOM, RANGES, Rates(*rates)).mutate)(keys, mothers)
+
+
+def mutants(mothers: Genotype, seed: int, rates: Rates = KIN.rates) -> Genotype:
+    values = [getattr(rates, field.name) for field in dataclasses.fields(rates)]
     keys = jax.random.split(key_of(seed), COUNT)
-    return breeder(name)(keys, *parents[: 1 if name == "mutate" else 2])
+    return jax.device_get(_mutated(tuple(values), keys, mothers))
+
+
+def children(name: str, parents: tuple[Genotype, Genotype], seed: int = 2) -> Genotype:
+    if name == "mutate":
+        return mutants(parents[0], seed)
+    return jax.device_get(breeder(name)(jax.random.split(key_of(seed), COUNT), *parents))
 
 
 @pytest.fixture(scope="module", params=BUSY)
@@ -56,7 +68,7 @@ def bred(request: pytest.FixtureRequest, parents: tuple[Genotype, Genotype]) -> 
     pair = parents
     for seed in range(3):
         pair = children(request.param, pair, seed), children(request.param, pair[::-1], seed + 10)
-    return jax.tree.map(np.asarray, pair[0])
+    return pair[0]
 
 
 def test_children_are_graphs_within_their_ranges(bred: Genotype):
@@ -97,8 +109,8 @@ def test_the_same_key_gives_the_same_child(parents: tuple[Genotype, Genotype]):
 
 
 def test_crossover_keeps_nodes_whole(parents: tuple[Genotype, Genotype]):
-    mother, father = (jax.tree.map(np.asarray, p) for p in parents)
-    child = jax.tree.map(np.asarray, children("cross", parents))
+    mother, father = parents
+    child = children("cross", parents)
     came = {}
     for name in ("graph", "nerves"):
         for field in dataclasses.fields(getattr(child, name)):
@@ -118,7 +130,7 @@ def test_a_graft_attaches_the_fathers_root_to_the_mothers_graph(parents: tuple[G
     child = children("graft", parents)
     before, after = np.asarray(ALIVE(mother.graph)), np.asarray(ALIVE(child.graph))
     room = ~before.all(1)
-    half, his = np.asarray(child.graph.half), np.asarray(father.graph.half)
+    half, his = child.graph.half, father.graph.half
     # The father's root takes the first free node, and is reached.
     first = np.argmax(~before, axis=1)
     rows = np.arange(COUNT)
@@ -130,8 +142,8 @@ def test_a_graft_attaches_the_fathers_root_to_the_mothers_graph(parents: tuple[G
 
 def test_grafted_nodes_keep_their_connections(parents: tuple[Genotype, Genotype]):
     """The father's nodes keep their targets in new places; targets without a place are dropped."""
-    mother, father = (jax.tree.map(np.asarray, p) for p in parents)
-    child = jax.tree.map(np.asarray, children("graft", parents))
+    mother, father = parents
+    child = children("graft", parents)
     free = ~np.asarray(ALIVE(mother.graph))
     led, dropped = 0, 0
     for row in range(COUNT):
@@ -154,29 +166,26 @@ def changed(child: Genotype, parent: Genotype) -> np.ndarray:
     for name in ("graph", "nerves"):
         leaves = zip(*(jax.tree.leaves(getattr(g, name)) for g in (child, parent)), strict=True)
         for mine, hers in leaves:
-            differs = np.asarray(mine != hers).reshape(COUNT, CAPACITY.nodes, -1).sum(2)
+            differs = (mine != hers).reshape(COUNT, CAPACITY.nodes, -1).sum(2)
             changes += (differs * alive).sum(1)
     return changes
 
 
 def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
-    calm = Kin(CAPACITY, ROOM, RANGES, Rates(value=4.0, connection=0.0, node=0.0))
-    keys = jax.random.split(key_of(3), COUNT)
-    child = jax.jit(jax.vmap(calm.mutate))(keys, parents[0])
+    child = mutants(parents[0], 3, Rates(value=4.0, connection=0.0, node=0.0))
     changes = changed(child, parents[0])
     # A kind that is drawn again may come out the same.
     assert 2.5 < changes.mean() < 4.2
-    assert jnp.array_equal(child.graph.used, parents[0].graph.used)
+    np.testing.assert_array_equal(child.graph.used, parents[0].graph.used)
 
 
 def test_with_random_strengths_most_mutations_are_mild_and_few_strong(
     parents: tuple[Genotype, Genotype],
 ):
     rates = Rates(value=8.0, connection=0.8, node=0.0, strength=(1 / 16, 2.0))
-    keys = jax.random.split(key_of(3), COUNT)
-    child = jax.jit(jax.vmap(Kin(CAPACITY, ROOM, RANGES, rates).mutate))(keys, parents[0])
+    child = mutants(parents[0], 3, rates)
     # Only children with unchanged connections: a connection takes values with it.
-    same = np.asarray((child.graph.used == parents[0].graph.used).all((1, 2)))
+    same = (child.graph.used == parents[0].graph.used).all((1, 2))
     changes = changed(child, parents[0])[same]
     assert (changes <= 1).mean() > 0.3
     assert (changes >= 9).mean() > 0.03
@@ -186,18 +195,17 @@ def test_with_random_strengths_most_mutations_are_mild_and_few_strong(
 
 def test_a_resize_multiplies_all_sizes_by_one_factor(parents: tuple[Genotype, Genotype]):
     rates = Rates(value=0.0, connection=0.0, node=0.0, resize=0.25)
-    keys = jax.random.split(key_of(3), COUNT)
-    child = jax.jit(jax.vmap(Kin(CAPACITY, ROOM, RANGES, rates).mutate))(keys, parents[0])
-    factor = np.asarray(child.graph.half / parents[0].graph.half)
+    child = mutants(parents[0], 3, rates)
+    factor = child.graph.half / parents[0].graph.half
     resized = (factor != 1).any((1, 2))
     assert resized.mean() == pytest.approx(0.25, abs=0.04)
     low, high = RANGES.half
-    within = np.asarray((child.graph.half > low) & (child.graph.half < high))
+    within = (child.graph.half > low) & (child.graph.half < high)
     spread = [np.ptp(one[free]) for one, free in zip(factor, within, strict=True) if free.any()]
     assert max(spread) < 1e-5
     assert np.std(np.log(np.median(factor[resized], (1, 2)))) == pytest.approx(0.2, abs=0.03)
     same = jax.tree.map(
-        jnp.array_equal,
+        np.array_equal,
         dataclasses.replace(
             child, graph=dataclasses.replace(child.graph, half=parents[0].graph.half)
         ),
@@ -221,7 +229,7 @@ def test_central_neurons_do_not_change_a_graphs_mutation():
 
 def test_mutation_adds_and_removes_nodes_and_connections(parents: tuple[Genotype, Genotype]):
     child = children("mutate", parents)
-    used, before = (np.asarray(g.graph.used).sum((1, 2)) for g in (child, parents[0]))
+    used, before = (g.graph.used.sum((1, 2)) for g in (child, parents[0]))
     assert (used > before).mean() > 0.2
     assert (used < before).mean() > 0.05
     alive, were = (np.asarray(ALIVE(g.graph)).sum(1) for g in (child, parents[0]))

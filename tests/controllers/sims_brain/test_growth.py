@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -33,13 +34,19 @@ GROW = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))
 EMBODY = jax.jit(lambda graph: body_of(graph, CAPACITY))
 
 
-def draw(count: int, seed: int = 0) -> Graph:
-    return CREATE(jax.random.split(key_of(seed), count))
+def grown_alone(graph: Graph) -> Parts:
+    """Parts of one graph, by the program that all tests of single bodies share."""
+    return jax.device_get(EMBODY(graph).parts)
+
+
+@cache
+def drawn() -> Graph:
+    return jax.device_get(CREATE(jax.random.split(key_of(0), COUNT)))
 
 
 @pytest.fixture(scope="module")
 def graphs() -> Graph:
-    return jax.tree.map(np.asarray, draw(COUNT))
+    return drawn()
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +85,8 @@ def test_a_body_stays_within_capacity(parts: Parts):
     np.testing.assert_allclose(np.linalg.det(rows), 1, atol=1e-5)
 
 
-def test_the_same_graph_grows_into_the_same_body():
-    graph = draw(3)
-    first, again = (GROW(graph) for _ in range(2))
-    for a, b in zip(jax.tree.leaves(first), jax.tree.leaves(again), strict=True):
+def test_the_same_graph_grows_into_the_same_body(graphs: Graph, parts: Parts):
+    for a, b in zip(jax.tree.leaves(parts), jax.tree.leaves(GROW(graphs)), strict=True):
         np.testing.assert_array_equal(a, b)
 
 
@@ -89,7 +94,7 @@ def star(
     mirror: int, recursion: int = 0, joint: str = "universal", terminal: bool = False
 ) -> Graph:
     """A root with one kind of limb on its side, which may repeat itself."""
-    base = one(draw(1), 0)
+    base = one(drawn(), 0)
     each = (CAPACITY.nodes, CAPACITY.connections)
     node, order = np.indices(each)
     away = np.where(node[..., None] == 0, [0.2, 1.0, 0.3], [1.0, 0.2, 0.3])
@@ -110,7 +115,7 @@ def star(
 
 @pytest.mark.parametrize(("recursion", "parts"), [(0, 2), (1, 3), (3, 5)])
 def test_a_node_repeats_up_to_its_recursion_limit(recursion: int, parts: int):
-    found = grown(star(mirror=0, recursion=recursion, joint="twist"), CAPACITY)
+    found = grown_alone(star(mirror=0, recursion=recursion, joint="twist"))
     assert int(found.exists.sum()) == parts
     assert found.depth[:parts].tolist() == [0, 0, *range(1, recursion + 1)]
 
@@ -121,12 +126,12 @@ def test_nothing_grows_into_an_existing_block():
     """
     back = star(mirror=0, recursion=1)
     back = dataclasses.replace(back, place=back.place.at[1, :, 0].set(-1.0))
-    assert int(grown(back, CAPACITY).exists.sum()) == 2
+    assert int(grown_alone(back).exists.sum()) == 2
     pair = star(mirror=2)
     close = dataclasses.replace(pair, place=jnp.full_like(pair.place, 0.1).at[..., 0].set(1.0))
-    assert int(grown(close, CAPACITY).exists.sum()) == 1
+    assert int(grown_alone(close).exists.sum()) == 1
     alone = dataclasses.replace(close, mirror=jnp.zeros_like(close.mirror))
-    assert int(grown(alone, CAPACITY).exists.sum()) == 2
+    assert int(grown_alone(alone).exists.sum()) == 2
 
 
 def test_grown_blocks_are_apart(graphs: Graph):
@@ -162,14 +167,15 @@ def test_a_child_is_attached_to_its_parents_surface(graphs: Graph):
 
 def test_a_terminal_connection_grows_only_at_the_end():
     """The limb's own connection leads to itself; at its end it may not repeat."""
-    assert int(grown(star(mirror=0, recursion=2, terminal=True), CAPACITY).exists.sum()) == 2
+    assert int(grown_alone(star(mirror=0, recursion=2, terminal=True)).exists.sum()) == 2
 
 
 def test_a_pair_grows_together_or_not_at_all():
     """Each limb has three hinges: eleven links suffice for three limbs."""
     body = EMBODY(star(mirror=2, recursion=1, joint="spherical"))
     assert int(body.parts.exists.sum()) == 4
-    pairs = grown(star(mirror=2), dataclasses.replace(CAPACITY, parts=2))
+    few = dataclasses.replace(CAPACITY, parts=2)
+    pairs = jax.jit(lambda graph: grown(graph, few))(star(mirror=2))
     assert int(pairs.exists.sum()) == 1
 
 

@@ -23,6 +23,7 @@ from mjxgait.controllers.sims_brain.operators import Genotype
 from mjxgait.controllers.sims_brain.reference_body import CUBE, DISTANCE, grow, opponent_genome
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
+from mjxgait.evolution.state import EvolutionState
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import build_config
 from mjxgait.reference.contest import contest_of
@@ -105,9 +106,21 @@ def alike(one: Any, other: Any) -> bool:
     return all(np.array_equal(a, b) for a, b in pairs)
 
 
+@pytest.fixture(scope="module")
+def opponents(experiment: Experiment) -> Callable[[EvolutionState], Any]:
+    """The opponents of a generation's offspring, which change every three generations."""
+    rollout = dataclasses.replace(experiment.config.rollout, hold=3)
+    config = dataclasses.replace(experiment.config, rollout=rollout)
+    evolution = evolution_of(experiment.simulator, config)
+    return jax.jit(lambda state: evolution.propose(state).offspring.opponent)
+
+
 @pytest.mark.parametrize(("generation", "changes"), [(-1, False), (0, True), (1, False), (6, True)])
 def test_all_meet_the_best_of_the_generation_before(
-    experiment: Experiment, generation: int, changes: bool
+    experiment: Experiment,
+    opponents: Callable[[EvolutionState], Any],
+    generation: int,
+    changes: bool,
 ):
     """Every three generations; in between the opponent stays, for those too that are drawn anew."""
     state = experiment.init()
@@ -115,10 +128,7 @@ def test_all_meet_the_best_of_the_generation_before(
     expected = dataclasses.replace(best, opponent=None) if changes else best.opponent
     count = COUNT * (generation >= 0)
     known = dataclasses.replace(state, generation=generation, seeded=count)
-    rollout = dataclasses.replace(experiment.config.rollout, hold=3)
-    config = dataclasses.replace(experiment.config, rollout=rollout)
-    evolution = evolution_of(experiment.simulator, config)
-    theirs = jax.jit(evolution.propose)(known).offspring.opponent
+    theirs = jax.device_get(opponents(known))
     offspring = len(jax.tree.leaves(theirs)[0])
     for place in range(offspring):
         assert alike(jax.tree.map(lambda leaf, at=place: leaf[at], theirs), expected)
@@ -131,7 +141,12 @@ def test_children_keep_the_opponent_of_their_mother(experiment: Experiment, firs
         jax.tree.map(lambda leaf, at=i: leaf[at], met(experiment, first, i)) for i in (0, 1)
     )
     key = experiment.init().key
-    child, mutant = variation.cross(key, one, other), variation.mutate(key, one)
+
+    @jax.jit
+    def bred(mother: Any, father: Any) -> tuple[Any, Any]:
+        return variation.cross(key, mother, father), variation.mutate(key, mother)
+
+    child, mutant = bred(one, other)
     assert alike(child.opponent, one.opponent)
     assert alike(mutant.opponent, one.opponent)
     assert not alike(mutant.nerves, one.nerves)
@@ -142,9 +157,8 @@ def test_a_body_draws_with_its_like(
 ):
     place = movers(first)[0]
     stats = played(met(experiment, first, place))
-    terms = jax.vmap(
-        jax.vmap(lambda s: experiment.simulator.task.evaluate(s, experiment.config.fitness))
-    )(stats)
+    settings, task = experiment.config.fitness, experiment.simulator.task
+    terms = jax.jit(jax.vmap(jax.vmap(lambda s: task.evaluate(s, settings))))(stats)
     share = np.asarray(terms["share"])[:, 0]
     assert share[place] == pytest.approx(0.5, abs=0.01)
     still = np.setdiff1d(np.arange(COUNT), movers(first))

@@ -3,6 +3,8 @@
 import dataclasses
 import types
 from collections.abc import Callable
+from functools import cache
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -27,6 +29,7 @@ from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.reference.stepping import Stepping
 from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.modular.base import ModularTask
 from mjxgait.tasks.modular.config import JumpConfig, RoamConfig
 from mjxgait.tasks.modular.follow import Following, FollowInWater, FollowOnLand, Light
 from mjxgait.tasks.modular.jump import LYING, Jump
@@ -56,7 +59,7 @@ def first(experiment: Experiment) -> EvolutionState:
     """The first population, evaluated without a generation step; best first."""
     state, task = experiment.init(), experiment.simulator.task
     stats = jax.jit(experiment.simulate)(state.genomes).stats
-    told = jax.vmap(jax.vmap(task.outcome))(stats)
+    told = jax.jit(jax.vmap(jax.vmap(task.outcome)))(stats)
     outcome = np.stack([np.asarray(told[name]) for name in task.outcomes], axis=-1)
     order = np.argsort(-outcome[:, :, 0].mean(1))
     return dataclasses.replace(
@@ -192,6 +195,12 @@ def test_heights_and_positions_are_kept_for_every_frame(experiment: Experiment, 
     assert max(highest) > 0
 
 
+@cache
+def updating(task: ModularTask) -> Callable[..., Any]:
+    """Update of a task's statistics, compiled once."""
+    return jax.jit(task.update)
+
+
 def evaluation(
     task: Roam,
     tilt: float = 0.0,
@@ -203,21 +212,21 @@ def evaluation(
 
     hertz: swings of one of the joints per second, at each moment.
     """
-    settings = RoamConfig(settle=0.5)
-    stats, params = task.init(), task.params(settings)
+    settings, update = RoamConfig(settle=0.5), updating(task)
+    stats, params, still = task.init(), task.params(settings), np.zeros(3, np.float32)
     for k in range(task.horizon):
         angle = np.radians({10: before, 100: tilt}.get(k, 0.0))
-        turned = jnp.array(
+        turned = np.float32(
             [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
         )
         own = {
-            "com": jnp.array([0.0, task.step * k, 0.1 * k]),
-            "depth": jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
+            "com": np.float32([0.0, task.step * k, 0.1 * k]),
+            "depth": np.float32({10: before, 100: sunk}.get(k, 0.0)),
         }
         time = task.step * k
-        swings = jnp.zeros_like(CALM.joint_vel).at[0].set(np.sin(2 * np.pi * hertz(time) * time))
+        swings = np.float32([np.sin(2 * np.pi * hertz(time) * time), 0, 0])
         sensed = moment(own, trunk_rot=turned, joint_vel=swings)
-        stats = task.update(stats, sensed, jnp.zeros(3), params, ())
+        stats = update(stats, sensed, still, params, ())
     return {name: float(value) for name, value in task.evaluate(stats, settings).items()}
 
 
@@ -257,17 +266,17 @@ def test_joints_that_vibrate_cost_speed(task: Roam):
 
 def test_jump_height_is_of_the_lowest_part_after_settling(task: Roam):
     jumping = Jump(task.creature, task.step, task.horizon, task.ends)
-    settings = JumpConfig(settle=0.5)
+    settings, still = JumpConfig(settle=0.5), np.zeros(3, np.float32)
 
     def jumped(sunk: float = 0.0, again: float = 0.0) -> dict[str, float]:
         """0.3 m high in the first half of the counted time, `again` m in the second."""
-        stats, params = jumping.init(), jumping.params(settings)
+        stats, params, update = jumping.init(), jumping.params(settings), updating(jumping)
         heights = {10: 0.7, 60: 0.2, 80: 0.3, 120: again, 140: again / 2}
         for k in range(task.horizon):
-            low = CALM.geom_low.at[:].set(1.0).at[1].set(heights.get(k, 0.0))
-            deep = jnp.float32(sunk if k == 100 else -1.0)
+            low = np.float32([1.0, heights.get(k, 0.0), 1.0, 1.0])
+            deep = np.float32(sunk if k == 100 else -1.0)
             sensed = moment({"depth": deep}, geom_low=low)
-            stats = jumping.update(stats, sensed, jnp.zeros(3), params, ())
+            stats = update(stats, sensed, still, params, ())
         return {name: float(value) for name, value in jumping.evaluate(stats, settings).items()}
 
     assert jumped(again=0.3) == pytest.approx({"height": 0.3, "overlap": 0, "wild": 0})
@@ -341,20 +350,26 @@ def test_the_way_to_a_light_that_moves_is_the_sum_of_both(task: Roam):
     assert seen == pytest.approx([0.0, 0.0, 2.0, 3.0, 4.0, 5.0], abs=1e-5)
 
 
+def lights_of(following: Following, rollout: RolloutConfig) -> Light:
+    """Lights of all trials, drawn by one program."""
+    creature = load_creature("blocks")
+    return jax.device_get(
+        jax.jit(lambda key: following.trials(key, creature, rollout).goal)(key_of(0))
+    )
+
+
 @pytest.mark.parametrize(("others", "moved"), [(1, False), (2, True), (3, True)])
 def test_lights_change_places_in_all_trials_but_the_first(task: Roam, others: int, moved: bool):
     following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
-    creature, rounds = load_creature("blocks"), 20
+    rounds = 20
     rollout = RolloutConfig(starts=1 + others * rounds, variety=rounds)
-    still = following.trials(key_of(0), creature, rollout).goal
-    assert (np.asarray(still.steps) == NEVER).all()
-    lights = following.trials(key_of(0), creature, dataclasses.replace(rollout, moves=0.5)).goal
+    still = lights_of(following, rollout)
+    assert (still.steps == NEVER).all()
+    lights = lights_of(following, dataclasses.replace(rollout, moves=0.5))
     np.testing.assert_array_equal(lights.place, still.place)
     assert lights.steps[0] == NEVER
-    assert (np.asarray(lights.steps[1:]) == round(0.5 / task.step)).all()
-    before, after = (
-        np.asarray(all_[1:]).reshape(rounds, others, 3) for all_ in (lights.place, lights.later)
-    )
+    assert (lights.steps[1:] == round(0.5 / task.step)).all()
+    before, after = (all_[1:].reshape(rounds, others, 3) for all_ in (lights.place, lights.later))
     np.testing.assert_allclose(before.sum(1), after.sum(1), atol=1e-5)
     assert (np.abs(before - after).max(2) > 0.1).all() == moved
 
@@ -368,9 +383,7 @@ def test_lights_cancel_out_and_change_every_round(task: Roam, follower: type, ot
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rounds = 200
     rollout = RolloutConfig(starts=1 + others * rounds, variety=rounds)
-    lights = (
-        np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
-    )
+    lights = lights_of(following, rollout).place / LIGHT
     np.testing.assert_allclose(np.linalg.norm(lights, axis=1), 1.0, rtol=1e-5)
     assert lights[0] == pytest.approx([1, 0, 0])
     drawn = lights[1:].reshape(rounds, others, 3)
@@ -387,9 +400,7 @@ def test_lights_cancel_out_and_change_every_round(task: Roam, follower: type, ot
 def test_many_lights_cover_all_directions(task: Roam, follower: type):
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=200)
-    lights = (
-        np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
-    )
+    lights = lights_of(following, rollout).place / LIGHT
     spread = (lights**2).mean(0)
     np.testing.assert_allclose(spread[: following.axes], 1 / following.axes, atol=0.1)
 
@@ -397,9 +408,7 @@ def test_many_lights_cover_all_directions(task: Roam, follower: type):
 def test_lights_in_water_form_tetrahedra_and_crosses(task: Roam):
     following = FollowInWater(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=1 + 3 * 100, variety=100)
-    lights = (
-        np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).goal.place) / LIGHT
-    )
+    lights = lights_of(following, rollout).place / LIGHT
     cosines = [np.sort(np.r_[1, one[:, 0]]) for one in lights[1:].reshape(100, 3, 3)]
     solid, cross = ([-1 / 3] * 3 + [1], [-1, 0, 0, 1])
     solids = sum(bool(np.allclose(found, solid, atol=1e-5)) for found in cosines)

@@ -35,11 +35,14 @@ from mjxgait.experiments.ablation.measures import walked
 from mjxgait.kinds import skills_of, tasks
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import build_config
+from mjxgait.simulation.evaluator import Local
+from mjxgait.simulation.rollout import Episodes
 from mjxgait.tasks.modular.jump import LYING
-from mjxgait.tasks.modular.skills import AllTrades, Amphibian, SkillsStats
-from mjxgait.tasks.starts import NEVER
-from mjxgait.training.experiment import Experiment, build_experiment
+from mjxgait.tasks.modular.skills import AllTrades, Amphibian, Skills, SkillsStats
+from mjxgait.tasks.starts import NEVER, Starts
+from mjxgait.training.experiment import Experiment, build_experiment, one_row, row_of
 from mjxgait.training.folder import CERTIFICATE, CHAMPION, create_run, open_champion, open_run
+from mjxgait.types import Evaluation
 
 TABLE: dict[str, Any] = {
     "use": {"controller": "brain", "task": "amphibian"},
@@ -72,6 +75,33 @@ def experiment() -> Experiment:
     return build_experiment(load_creature("blocks"), config_of())
 
 
+class Simulated:
+    """Evaluator with one compiled simulation, which also tells its statistics."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self._simulate = jax.jit(experiment.simulator.simulate)
+        self._verdict = jax.jit(jax.vmap(Local(experiment.simulator).verdict))
+
+    def simulate(self, *rows: Any) -> Episodes:
+        """Genomes, trials and settings, each of one row; as NumPy arrays, for the same program."""
+        found: Episodes = self._simulate(*jax.device_get(rows))
+        return found
+
+    def evaluate(
+        self, genomes: Any, trials: Starts, settings: Config, requested: None = None
+    ) -> Evaluation:
+        """See `Evaluator`; the settings are of one row, which all steps belong to."""
+        episodes = self.simulate(genomes, trials, settings)
+        each = dataclasses.replace(episodes, computed_steps=episodes.computed_steps[None])
+        found: Evaluation = jax.device_get(self._verdict(*jax.device_get((settings, each))))
+        return found
+
+
+@pytest.fixture(scope="module")
+def evaluator(experiment: Experiment) -> Simulated:
+    return Simulated(experiment)
+
+
 @pytest.fixture(scope="module")
 def champion(experiment: Experiment) -> Champion:
     """The first individual of a first population that has hinges, as if it had been evaluated."""
@@ -102,10 +132,16 @@ def test_every_skill_is_a_task_of_its_own():
         assert {table for skill in skills for table in tasks()[skill].tables} == set(kind.tables)
 
 
+def drawn(task: Skills, settings: RolloutConfig) -> Starts:
+    """Starts of all trials, drawn by one program."""
+    creature = load_creature("blocks")
+    return jax.device_get(jax.jit(lambda key: task.trials(key, creature, settings))(key_of(0)))
+
+
 def test_trials_command_the_skills_in_turn():
     task = AllTrades(load_creature("blocks"), 0.01, 100, None)
     settings = RolloutConfig(starts=8, joint_noise=0.3)
-    starts = task.trials(key_of(0), load_creature("blocks"), settings)
+    starts = drawn(task, settings)
     np.testing.assert_array_equal(starts.goal.skill, [0, 1, 2, 3, 0, 1, 2, 3])
     np.testing.assert_array_equal(starts.ground.wet, [1, 0, 0, 1, 1, 0, 0, 1])
     bent = np.abs(starts.qpos[:, 7:]).max(1) > 0
@@ -119,7 +155,7 @@ def test_every_round_has_the_skills_in_turn():
     """With `variety` the first trial of a skill stays undisturbed, and lights cancel out."""
     task, rounds, others = AllTrades(load_creature("blocks"), 0.01, 100, None), 5, 15
     settings = RolloutConfig(starts=1 + rounds * others, variety=rounds, joint_noise=0.3)
-    starts = task.trials(key_of(0), load_creature("blocks"), settings)
+    starts = drawn(task, settings)
     for number in range(rounds):
         places = np.append(0, 1 + number * others + np.arange(others))
         own = jax.tree.map(lambda leaf, at=places: np.asarray(leaf)[at], starts)
@@ -130,8 +166,8 @@ def test_every_round_has_the_skills_in_turn():
     assert len(np.unique(np.asarray(starts.qpos)[:, 7])) == 1 + 3 * 4 * rounds
 
 
-def test_the_skills_get_better_together(experiment: Experiment):
-    step, state, mean = experiment.compile(), experiment.place(experiment.init()), []
+def test_the_skills_get_better_together(experiment: Experiment, evaluator: Simulated):
+    step, state, mean = experiment.compile(evaluator), experiment.place(experiment.init()), []
     for _ in range(3):
         state, metrics = step(state)
         mean.append(float(metrics.mean))
@@ -139,10 +175,11 @@ def test_the_skills_get_better_together(experiment: Experiment):
 
 
 @pytest.fixture(scope="module")
-def simulated(experiment: Experiment) -> tuple[Any, SkillsStats]:
+def simulated(experiment: Experiment, evaluator: Simulated) -> tuple[Any, SkillsStats]:
     """The first population, and its statistics in all trials."""
     genomes = experiment.init().genomes
-    return genomes, jax.jit(experiment.simulate)(genomes).stats
+    rows = one_row((genomes, experiment.starts, experiment.row.settings))
+    return genomes, row_of(evaluator.simulate(*rows).stats)
 
 
 @pytest.mark.parametrize(("number", "task"), [(0, "swim"), (1, "roam")])
@@ -229,7 +266,7 @@ def test_lying_still_ends_only_a_trial_of_jumping():
         fitness={},
     ).fitness
     params, sensed = task.params(settings), moment()
-    starts = task.trials(key_of(0), load_creature("blocks"), RolloutConfig(starts=8))
+    starts = drawn(task, RolloutConfig(starts=8))
     sensed = dataclasses.replace(
         sensed,
         joint_vel=jnp.zeros(len(task.creature.joints.names)),
@@ -250,7 +287,7 @@ def test_lying_still_ends_only_a_trial_of_jumping():
 
 def test_only_a_follower_sees_the_light():
     task = AllTrades(load_creature("blocks"), 0.01, 1200, None)
-    starts = task.trials(key_of(0), load_creature("blocks"), RolloutConfig(starts=8))
+    starts = drawn(task, RolloutConfig(starts=8))
     sensed = moment({"geom_rot": jnp.tile(jnp.eye(3), (4, 1, 1))})
     for trial, skill in enumerate(np.asarray(starts.goal.skill)):
         goal = task.goal(jax.tree.map(lambda leaf, at=trial: leaf[at], starts))
@@ -260,9 +297,7 @@ def test_only_a_follower_sees_the_light():
         assert (np.abs(seen["light"]).max() > 0) == (skill == 3)
     assert (np.asarray(starts.goal.light.steps) == NEVER).all()
     dark = Amphibian(load_creature("blocks"), 0.01, 100, None)
-    assert (
-        dark.trials(key_of(0), load_creature("blocks"), RolloutConfig(starts=4)).goal.light is None
-    )
+    assert drawn(dark, RolloutConfig(starts=4)).goal.light is None
 
 
 def test_each_skill_is_a_champion_of_its_own_task(champion: Champion):
