@@ -1,6 +1,6 @@
 """Both plants on uneven ground against C MuJoCo (float64), with one plane under each foot.
 
-Each plane touches the ground at the point nearest to the foot, from the reference simulator's
+Gravity is tilted, too. Each plane touches the ground at the point nearest to the foot, from the reference simulator's
 heights. So contacts in C have the same place, axes and weight, and whole steps can be compared.
 """
 
@@ -26,6 +26,8 @@ from mjxgait.types import BodyState
 
 HIP, LENGTH = 0.4, 0.5
 FORWARD = np.array([0.6, 0.8, 0.0])
+DOWN = np.array([-0.12, 0.16, -0.97980])
+"""Direction of gravity."""
 FEET = ("left_foot", "right_foot", "rear_foot")
 LEG = """
 <body name="{name}" pos="{place} -0.03" quat="0.98 0.05 0.1 0.15">
@@ -122,6 +124,7 @@ def scene(request: pytest.FixtureRequest, plants: SimpleNamespace) -> Scene:
     spec = parse_ground(request.param)
     start = np.zeros(3)
     ground = lay_ground(spec, Place(start, FORWARD, HIP, LENGTH), named_draws(spec.seed))
+    ground = dataclasses.replace(ground, down=jnp.float32(DOWN))
     left = np.array([-FORWARD[1], FORWARD[0], 0.0])
     terrain = Terrain(spec, StartFrame(start, FORWARD, left), HIP, LENGTH)
     state = _states(plants.plane_model)
@@ -162,6 +165,7 @@ def step_in_c(
         data.mocap_pos[n] = place
         mujoco.mju_quatZ2Vec(data.mocap_quat[n], normal)
     model.geom_friction[:, 0] *= float(state.friction[lane])
+    model.opt.gravity[:] = 9.81 * DOWN
     mujoco.mj_step(model, data)
     model.geom_friction[:] = nominal
     return data

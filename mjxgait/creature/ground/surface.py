@@ -6,6 +6,7 @@ one creature ([] and [n]) and lanes innermost ([L] and [n, L]). Kinds of ground:
 docs/reference/ground.md.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
@@ -41,12 +42,17 @@ class Relief(Protocol):
 
 @pytree
 class Ground:
-    """One trial's ground. start: [2] m. forward: [2]. level: [] m, see `Relief`."""
+    """One trial's ground.
+
+    start: [2] m. forward: [2]. level: [] m, see `Relief`. down: [3] unit vector of gravity; None
+    for straight down.
+    """
 
     start: jax.Array
     forward: jax.Array
     level: jax.Array
     relief: Relief
+    down: jax.Array | None = None
 
 
 @pytree
@@ -116,20 +122,6 @@ class Waves(Relief):
         )
 
 
-@pytree
-class Together(Relief):
-    """Waves on a slope: the sum of their heights."""
-
-    slope: Slope
-    waves: Waves
-
-    @override
-    def rise(self, ahead: jax.Array, left: jax.Array, level: jax.Array) -> Vector:
-        height, by_ahead, by_left = self.slope.rise(ahead, left, level)
-        more, more_ahead, more_left = self.waves.rise(ahead, left, level)
-        return height + more, by_ahead + more_ahead, by_left + more_left
-
-
 def _full(ahead: jax.Array, left: jax.Array, level: jax.Array) -> Vector:
     """Share of the full height, and its changes per metre.
 
@@ -165,13 +157,28 @@ def lay_ground(spec: GroundSpec, place: Place, draws: Number) -> Ground | None:
 def lay_uneven(
     place: Place, slope: Number | Sequence[float], rough: float, draws: Number
 ) -> Ground:
-    """Rough ground on a slope to any side.
+    """Rough ground on a slope to any side, which begins at the start, as in the examination.
+
+    Gravity is tilted instead of the ground: a creature stands at right angles to the slope, and
+    heights are measured so.
 
     slope: [2] rise per metre ahead and to the left. rough: hip heights, the most that the waves
     rise or fall. draws: see `lay_ground`.
     """
     waves = _waves(GroundSpec("rough", rough), place.hip_height, jnp.asarray(draws))
-    return _laid(place, Together(Slope(*jnp.float32(slope)), waves))
+    way, rise = jnp.asarray(place.forward, jnp.float32), jnp.asarray(slope, jnp.float32)
+    east, north = rise[0] * way[0] - rise[1] * way[1], rise[0] * way[1] + rise[1] * way[0]
+    uphill = jnp.stack([east, north, jnp.ones(())])
+    return dataclasses.replace(_laid(place, waves), down=-uphill / jnp.linalg.norm(uphill))
+
+
+def pulled(ground: Ground | None, gravity: Vector) -> Vector:
+    """Gravity in m/s² on a ground, from that on level ground; components [] or [L]."""
+    if ground is None or ground.down is None:
+        return gravity
+    x, y, z = gravity
+    strength = (x * x + y * y + z * z) ** 0.5
+    return strength * ground.down[0], strength * ground.down[1], strength * ground.down[2]
 
 
 def _laid(place: Place, relief: Relief) -> Ground:

@@ -174,7 +174,12 @@ def force_cross(a: Motion, force: Motion) -> Motion:
 
 
 def bias_force(
-    structure: Structure, body: Inertia, freedom: Motion, qvel: jax.Array, pin: Pin
+    structure: Structure,
+    body: Inertia,
+    freedom: Motion,
+    qvel: jax.Array,
+    gravity: Vector,
+    pin: Pin,
 ) -> tuple[jax.Array, list[jax.Array]]:
     """Bias force (`qfrc_bias`) [nv, L] and every body's velocity [6, L].
 
@@ -183,7 +188,7 @@ def bias_force(
     steps = Motion(scale(qvel, freedom.spin), scale(qvel, freedom.shift))
     moving, before = down(structure, pack(steps.parts, pin), np.zeros((6, 1), qvel.dtype), pin)
     carried = motion_cross(unpack(before), steps)
-    upwards = -column((0.0, 0.0, 0.0, *structure.gravity), qvel.dtype)
+    upwards = -column((0.0, 0.0, 0.0, *gravity), qvel.dtype)
     swept, _ = down(structure, pack(carried.parts, pin), upwards, pin)
     velocity = unpack(pin(jnp.stack(moving)))
     momentum = body.times(velocity)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjxgait.creature.ground.surface import Ground, clearance, height
+from mjxgait.creature.ground.surface import Ground, clearance, height, pulled
 from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.derived import ObservationLayout, OtherTopology, deepest
 from mjxgait.physics.lane_major.constraints import make_constraints, touch
@@ -181,7 +181,8 @@ class LaneMajorPlant:
         poses, freedoms = posture(structure, state.qpos, pin)
         freedom = motions(freedoms, like, pin)
         body = inertias(structure.columns, poses, like, pin)
-        bias, moving = bias_force(structure, body, freedom, state.qvel, pin)
+        gravity = pulled(state.ground, structure.gravity)
+        bias, moving = bias_force(structure, body, freedom, state.qvel, gravity, pin)
         bias = bias + _resistance(structure, state)
         if self.topology.water:
             bias = bias - fluid_force(structure, poses, body, freedom, moving, pin)

@@ -11,6 +11,7 @@ from helpers import small_config
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.creature.creature import start_place
+from mjxgait.creature.ground.spec import parse_ground
 from mjxgait.creature.ground.surface import (
     Ground,
     contact,
@@ -19,8 +20,10 @@ from mjxgait.creature.ground.surface import (
     lay_uneven,
     named_draws,
     normal,
+    pulled,
 )
 from mjxgait.evolution.chance import key_of
+from mjxgait.reference.starts import _gravity
 from mjxgait.reference.terrain import terrain_of
 from mjxgait.tasks.starts import Starts, draw_grounds, draw_starts
 
@@ -68,14 +71,19 @@ def test_heights_match_the_reference_simulator(stool: Creature, text: str):
     np.testing.assert_allclose(ours, theirs.height(x, y), atol=2e-5)
 
 
-def test_uneven_ground_is_the_sum_of_slope_and_roughness(stool: Creature):
-    """Each with the heights of the named ground of its kind."""
+def test_uneven_ground_is_rough_under_the_gravity_of_a_slope(stool: Creature):
+    """Heights are those of the named ground, gravity that of the examination's slopes."""
     x, y = places(stool, 10.0)
-    draws = named_draws(0)
-    for slope, text in (((-0.2, 0.0), "slope:0.2:down"), ((0.0, 0.2), "slope:0.2:across")):
-        both = height(lay_uneven(start_place(stool), slope, 0.1, draws), x, y)
-        parts = [height(laid(stool, each), x, y) for each in (text, "rough:0.1")]
-        np.testing.assert_allclose(both, sum(parts), atol=1e-5)
+    place = start_place(stool)._replace(forward=np.array([0.6, 0.8, 0.0]))
+    rough = lay_ground(parse_ground("rough:0.1"), place, named_draws(0))
+    for slope in ((-0.2, 0.0), (0.0, 0.2), (0.1, -0.1), (0.0, 0.0)):
+        ground = lay_uneven(place, slope, 0.1, named_draws(0))
+        np.testing.assert_array_equal(height(ground, x, y), height(rough, x, y))
+        angle, (ahead, left) = np.arctan(np.hypot(*slope)), slope
+        way = np.array([0.6 * ahead - 0.8 * left, 0.8 * ahead + 0.6 * left])
+        rise = way * angle / (np.hypot(*slope) or 1.0)
+        theirs = _gravity(stool.model, rise[None])[0]
+        np.testing.assert_allclose(pulled(ground, (0.0, 0.0, -9.81)), theirs, atol=1e-5)
 
 
 def test_perturbed_starts_have_their_own_uneven_ground(stool: Creature):
@@ -86,16 +94,17 @@ def test_perturbed_starts_have_their_own_uneven_ground(stool: Creature):
     far = 20 * stool.frame.body_length * jnp.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
     x, y = far + stool.frame.stand_pos[:2, None]
     far_off = jax.jit(jax.vmap(lambda each: height(each, x, y)))
-    heights = np.asarray(far_off(ground))
-    assert not heights[0].any()
-    assert (np.abs(heights[1:]).max(1) > 0).all()
-    steepest = np.tan(np.radians(10.0)) * 20 * stool.frame.body_length
-    assert np.abs(heights).max() <= 1.05 * steepest
-    # Slopes spread evenly: in no direction do all rise or all fall. Behind the start all is level.
-    for direction in heights[1:, [0, 2, 3]].T:
+    down = np.asarray(ground.down)
+    assert not np.asarray(far_off(ground)).any()
+    np.testing.assert_array_equal(down[0], [0.0, 0.0, -1.0])
+    steep = np.degrees(np.arccos(-down[1:, 2]))
+    assert 0 < steep.min() < steep.max() <= 10.0
+    # Slopes spread evenly: in no direction do all rise or all fall.
+    for direction in down[1:, :2].T:
         assert direction.min() < 0 < direction.max()
     rough = dataclasses.replace(config, slope=0.0, rough=0.1)
     ground = drawn(stool, rough).ground
+    np.testing.assert_array_equal(ground.down, np.tile([0.0, 0.0, -1.0], (6, 1)))
     heights = np.asarray(far_off(ground))
     assert not heights[0].any()
     assert 0 < np.abs(heights).max() <= 0.1 * stool.frame.hip_height
