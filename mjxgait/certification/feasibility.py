@@ -196,16 +196,11 @@ def feasibility(creature: Creature) -> Feasibility:
 
 def _reached(leg: Leg, creature: Creature, direction: Sequence[float]) -> float:
     """Hip heights that a foot can move in a direction (ahead, up), with some bend of the legs."""
-    most = 0.0
-    for crouch in CROUCHES:
-        most = max(most, _reached_at(leg, creature, direction, crouch, most))
-    return most
+    return max(_reached_at(leg, creature, direction, crouch) for crouch in CROUCHES)
 
 
-def _reached_at(
-    leg: Leg, creature: Creature, direction: Sequence[float], crouch: float, known: float
-) -> float:
-    """See `_reached`; by bisection, which ends where it is no more than is known."""
+def _reached_at(leg: Leg, creature: Creature, direction: Sequence[float], crouch: float) -> float:
+    """See `_reached`; by bisection."""
     pose, hip = creature.joints.stand.copy(), creature.frame.hip_height
 
     def reaches(way: float) -> bool:
@@ -214,11 +209,9 @@ def _reached_at(
         return leg.missed(path, pose, crouch) <= REACHED
 
     low, high = 0.0, MOST
-    if known >= high or reaches(high):
+    if reaches(high):
         return high
     for _ in range(HALVINGS):
-        if high <= known:
-            break
         middle = (low + high) / 2
         low, high = (middle, high) if reaches(middle) else (low, middle)
     return low

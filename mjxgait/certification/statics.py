@@ -67,18 +67,17 @@ class Statics:
         own = np.flatnonzero(self.feet == foot)
         if not len(own) or not len(leg.joints):
             return Load()
-        least = None
-        for lower in LOWER:
-            least = self._at_height(leg, own, ways, lower, least) or least
-        return least or self._carries(leg, own, self.creature.joints.stand)
+        found = [self._at_height(leg, own, ways, lower) for lower in LOWER]
+        known = [load for load in found if load is not None]
+        known = known or [self._carries(leg, own, self.creature.joints.stand)]
+        return min(known, key=lambda load: load.share)
 
     def _at_height(
-        self, leg: Leg, own: np.ndarray, ways: Sequence[float], lower: float, least: Load | None
+        self, leg: Leg, own: np.ndarray, ways: Sequence[float], lower: float
     ) -> Load | None:
         """Load at a height of the trunk; None if the foot does not reach its places there.
 
-        own: contacts of the foot. lower: hip heights below standing. least: that of other heights,
-        if known; None, too, if the load is not less.
+        own: contacts of the foot. lower: hip heights below standing.
         """
         joints, loads = self.creature.joints, []
         for way in ways:
@@ -87,8 +86,6 @@ class Statics:
             if leg.missed((way, 0.0), angles, lower) > REACHED:
                 return None
             loads.append(self._carries(leg, own, angles))
-            if least is not None and loads[-1].share >= least.share:
-                return None
         return max(loads, key=lambda load: load.share)
 
     def _carries(self, leg: Leg, own: np.ndarray, angles: np.ndarray) -> Load:

@@ -93,12 +93,11 @@ class Leg:
         joints, goal = self.creature.joints, self._goal(path, crouch)
         pose = pose.copy()
         low, high = joints.pose_low[self.joints], joints.pose_high[self.joints]
-        damping = DAMPING * np.eye(len(self.joints))
         for _ in range(ROUNDS):
             off, slopes = self._off(goal, pose)
-            moved = np.linalg.solve(slopes.T @ slopes + damping, slopes.T @ off)
-            moved += pose[self.joints]
-            pose[self.joints] = moved.clip(low, high)
+            square = slopes.T @ slopes + DAMPING * np.eye(len(self.joints))
+            moved = pose[self.joints] + np.linalg.solve(square, slopes.T @ off)
+            pose[self.joints] = np.clip(moved, low, high)
         return pose[self.joints]
 
     def missed(self, path: tuple[float, float], pose: np.ndarray, crouch: float = CROUCH) -> float:

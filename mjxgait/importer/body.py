@@ -38,12 +38,9 @@ def tip_points(tips: list[Tip], xpos: np.ndarray, xrot: np.ndarray, far: bool = 
     """Lowest points [n, 3] of the balls of a foot's end, or of its shank."""
     found = []
     for t in tips:
-        if len(points := t.ends[far]):
-            low = xpos[t.shape.body] + points @ xrot[t.shape.body].T
-            low[:, 2] -= t.shape.radius
-            found.append(low)
-    if len(found) == 1:
-        return found[0]
+        low = xpos[t.shape.body] + t.ends[far] @ xrot[t.shape.body].T
+        low[:, 2] -= t.shape.radius
+        found.append(low)
     return np.concatenate(found) if found else np.zeros((0, 3))
 
 

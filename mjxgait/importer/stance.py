@@ -3,7 +3,6 @@
 Letters: `J` active joints, `F` feet.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -112,18 +111,11 @@ def straightness(path: np.ndarray) -> float:
     path: [n, 3] from joint to joint to the sole. Thigh and shank are its longest two consecutive
     parts.
     """
-    # Written out, because a search calls this for each leg of hundreds of poses: `np.diff` and
-    # `np.linalg.norm` take about twice as long.
-    ways = path[1:] - path[:-1]
-    parts = np.sqrt((ways * ways).sum(1))
+    parts = np.linalg.norm(np.diff(path, axis=0), axis=1)
     if len(parts) < 2:
         return NEUTRAL
     k = int((parts[:-1] + parts[1:]).argmax())
-    return _length(path[k + 2] - path[k]) / max(float(parts[k] + parts[k + 1]), 1e-9)
-
-
-def _length(way: np.ndarray) -> float:
-    return math.sqrt(way.dot(way))
+    return float(np.linalg.norm(path[k + 2] - path[k])) / max(float(parts[k] + parts[k + 1]), 1e-9)
 
 
 class Search:
@@ -221,8 +213,7 @@ class Search:
         soles = kinematics.sole_points(xpos, xrot)
         lows = np.array([sole[:, 2].min() for sole in soles])
         floor = float(lows.min())
-        near_floor = [lowest_part(sole, hip) for sole in soles]
-        middles = np.array([low.sum(0) / len(low) for low in near_floor])
+        middles = np.array([lowest_part(sole, hip).mean(0) for sole in soles])
         off = (kinematics.centre_of_mass() - middles.mean(0))[:2] / hip
         others = [kinematics.lowest(xpos, xrot, s) - floor for s in self.segments]
         others.append(kinematics.shank_height(xpos, xrot) - floor)
@@ -263,7 +254,7 @@ class Search:
             anchors = self.kinematics.data.xanchor[[j + 1 for j in leg]]
             path = np.concatenate([anchors, middle[None]])
             off = (middle - anchors[0])[:2]
-            beneath += max(_length(off) / self.hip - 0.3, 0.0)
+            beneath += max(float(np.linalg.norm(off)) / self.hip - 0.3, 0.0)
             ahead += (float(off[0]) / self.hip) ** 2
             side = float(anchors[np.abs(anchors[:, 1]).argmax(), 1])
             narrow += max(abs(side) - float(middle[1]) * np.sign(side), 0.0) / self.hip

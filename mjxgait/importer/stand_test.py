@@ -97,7 +97,7 @@ def hold(
         mujoco.mj_step1(model, data)
         target = goal + correct(data) if correct else goal
         torque = spd_torque(model, data, target, kp, kd)
-        data.qfrc_applied[6:] = torque.clip(-limit, limit)
+        data.qfrc_applied[6:] = np.clip(torque, -limit, limit)
         mujoco.mj_step2(model, data)
         if not np.isfinite(data.qpos).all() or np.abs(data.qvel).max() > 1e3:
             return Held(-1.0, 0.0, 9.0, 9.0, touched)
