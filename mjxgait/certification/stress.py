@@ -128,6 +128,7 @@ def stress(
             "examines it"
         )
     config, found = config or StressConfig(), []
+    draw = draw or common(CertificateConfig())
     for name, tried in _trials(creature, champion, config, draw):
         tell(name)
         done = [_done(creature, outcome) for outcome in tried()]
@@ -139,11 +140,10 @@ def stress(
 
 
 def _trials(
-    creature: Creature, champion: Champion, config: StressConfig, draw: Draw | None
+    creature: Creature, champion: Champion, config: StressConfig, draw: Draw
 ) -> Iterator[tuple[str, Callable[[], list[Outcome]]]]:
     """Yield the name of each trial and the function that simulates it."""
-    rng = (draw or common(CertificateConfig())).generator
-    plain = perturbed_starts(creature, config.starts, rng(0))
+    plain = perturbed_starts(creature, config.starts, draw.generator(0))
 
     def walked(
         starts: Starts, body: Creature = creature, seconds: float = config.seconds
@@ -170,7 +170,7 @@ def _trials(
     yield f"friction {config.friction:g}", walked(even, slippery(creature, config.friction))
     speed = config.push * creature.unit_speed
     window = CertificateConfig().pushes.window
-    pushed = pushed_starts(creature, config.starts, rng(1), speed, window)
+    pushed = pushed_starts(creature, config.starts, draw.generator(1), speed, window)
     yield f"push of {config.push:g} √(g·h)", walked(pushed)
     mass = plain.mass.copy()
     mass[:, creature.trunk] *= config.trunk

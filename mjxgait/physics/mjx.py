@@ -117,12 +117,10 @@ class MjxPlant:
 
     def _model(self, state: BodyState) -> mjx.Model:
         model = self._numbers(state).put_in(self.model)
-        if state.ground is not None and state.ground.down is not None:
-            x, y, z = model.opt.gravity
-            gravity = jnp.stack(pulled(state.ground, (x, y, z)))
-            model = model.replace(opt=model.opt.replace(gravity=gravity))
+        gravity = jnp.stack(pulled(state.ground, tuple(model.opt.gravity)))
         return model.replace(
-            geom_friction=model.geom_friction * jnp.stack([state.friction, 1.0, 1.0])
+            geom_friction=model.geom_friction * jnp.stack([state.friction, 1.0, 1.0]),
+            opt=model.opt.replace(gravity=gravity),
         )
 
     def _forward(self, state: BodyState) -> tuple[Sensed, mjx.Data]:

@@ -151,12 +151,14 @@ class Examiner:
         if self.exams.attempt(name, generation) >= config.examination.attempts:
             return None
         seen = self._validated(champion, wanted, beaten=wanted)
-        ready = seen.margin >= wanted and self._rehearsed(champion)
-        if ready and (examined := self._examine(seen, hasty=True)).passed:
-            return examined
-        # Nothing that failed beyond the margin is tried again.
-        self._margins[known] = seen.margin if seen.margin < wanted else -np.inf
-        return None
+        self._margins[known] = seen.margin
+        if seen.margin < wanted:
+            return None
+        if not self._rehearsed(champion):
+            self._margins[known] = -np.inf
+            return None
+        examined = self._examine(seen, hasty=True)
+        return examined if examined.passed else None
 
     def _rehearsed(self, champion: Champion) -> bool:
         """Return whether a champion passes the stress tests on a draw of its own, if they decide.

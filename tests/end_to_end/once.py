@@ -1,15 +1,13 @@
 """What equals in many trainings, made once per process: simulators, predictions, fitness curves."""
 
-import functools
-from collections.abc import Callable, Hashable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mjxgait.certification.feasibility import Feasibility, feasibility
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
+from mjxgait.lru import LruCache
 from mjxgait.rendering.curves import Lines, plot_fitness
 from mjxgait.training.experiment import program_key
 from mjxgait.training.logs import columns
@@ -18,13 +16,11 @@ from mjxgait.training.spec import make_spec
 
 DRAWN = ("generation", "best", "mean", "lower_quartile", "upper_quartile", "forced")
 """Columns of a log that the fitness curve shows."""
-_KNOWN: dict[Hashable, Any] = {}
-
-
-def _once(key: Hashable, make: Callable[[], Any]) -> Any:
-    if key not in _KNOWN:
-        _KNOWN[key] = make()
-    return _KNOWN[key]
+KEPT = 99
+"""More than there are."""
+SPECS: LruCache[SimulatorSpec] = LruCache(KEPT)
+PREDICTIONS: LruCache[Feasibility] = LruCache(KEPT)
+CURVES: LruCache[bytes] = LruCache(KEPT)
 
 
 def spec_made_once(creature: Creature, config: Config) -> SimulatorSpec:
@@ -32,12 +28,12 @@ def spec_made_once(creature: Creature, config: Config) -> SimulatorSpec:
 
     So the program of the first state is traced and loaded once.
     """
-    return _once(program_key(creature, config), functools.partial(make_spec, creature, config))
+    return SPECS.find(program_key(creature, config), lambda: make_spec(creature, config))
 
 
 def predicted_once(creature: Creature) -> Feasibility:
     """Stand in for `feasibility`: all bodies here follow from their files alone."""
-    return _once(creature.digest, functools.partial(feasibility, creature))
+    return PREDICTIONS.find(creature.digest, lambda: feasibility(creature))
 
 
 def curve_drawn_once(lines: Lines, path: Path) -> None:
@@ -49,4 +45,4 @@ def curve_drawn_once(lines: Lines, path: Path) -> None:
         plot_fitness(lines, path)
         return path.read_bytes()
 
-    path.write_bytes(_once(shown.tobytes(), draw))
+    path.write_bytes(CURVES.find(shown.tobytes(), draw))
