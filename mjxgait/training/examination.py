@@ -86,7 +86,8 @@ class Examiner:
     exams: Exams
     prescreen: Prescreen | None = None
     examines: threading.Event = dataclasses.field(default_factory=threading.Event)
-    """Set once a validation has reached the examination, which uses all cores."""
+    """Set once the undisturbed walk of a validation is good enough. The rest uses all cores, and
+    often ends the run, which discards what evolves meanwhile."""
     _margins: dict[tuple[str, int], float] = dataclasses.field(default_factory=dict)
     """Upper bound of the margin by fingerprint and number of starts, of champions that missed it
     during the run. Validating them again would give the same."""
@@ -227,6 +228,7 @@ class Examiner:
         seen = nominal_check(creature, champion)
         margin = seen.margin
         if margin >= wanted:
+            self.examines.set()
             draw = self._starts(int(champion.origin["generation"]))
             caution = self.experiment.config.examination.caution
             by_trial_run = trial_run(creature, champion, draw, wanted=beaten, caution=caution)
@@ -240,7 +242,6 @@ class Examiner:
             f"Generation {generation}: examining the champion in C MuJoCo, attempt {attempt}…"
         )
         body = seen.champion.embodied(self.experiment.creature)
-        self.examines.set()
         certificate = certify(body, seen.champion, seen=seen.nominal_check, attempts=attempt)
         beyond = None
         if certificate.passed and self._goes_anywhere:
@@ -317,8 +318,8 @@ class Validation:
         """Return the certified individual and the state of its generation, once known; else None.
 
         Args:
-          wait: wait for the result. During an examination it waits anyway: evolution would compete
-            for its cores, and its generations would be discarded if the examination passes.
+          wait: wait for the result. Once the disturbed walks have begun it waits anyway: evolution
+            would compete for their cores, and its generations would be discarded if they pass.
         """
         if self._result is None or self._state is None:
             return None

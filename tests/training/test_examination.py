@@ -533,19 +533,24 @@ def test_generations_evolved_during_a_passing_validation_are_dropped(
     assert files_of(beside) == files_of(waited)
 
 
-def test_at_most_one_generation_evolves_during_certification(
-    tmp_path: Path, experiment: Experiment, promising: None, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("what", ["trial_run", "certify"])
+def test_at_most_one_generation_evolves_during_disturbed_walks(
+    tmp_path: Path,
+    experiment: Experiment,
+    promising: None,
+    monkeypatch: pytest.MonkeyPatch,
+    what: str,
 ):
-    """Certification takes all cores; only the generation that has begun is finished."""
-    folder, latest, soon = tmp_path / "run", [], examination.certify
+    """They take all cores; only the generation that has begun is finished."""
+    folder, latest, soon = tmp_path / "run", [], getattr(examination, what)
 
-    def slow(*arguments: object, **settings: object) -> Certificate:
+    def slow(*arguments: object, **settings: object) -> object:
         for _ in range(2):
             latest.append(read_metrics(folder / "metrics.jsonl")[-1]["generation"])
             time.sleep(0.5)
         return soon(*arguments, **settings)
 
-    monkeypatch.setattr(examination, "certify", slow)
+    monkeypatch.setattr(examination, what, slow)
     create_run(folder, experiment.creature, experiment.config)
     assert "in generation 3" in trained(folder, experiment)
     assert latest[1] - latest[0] <= 1
