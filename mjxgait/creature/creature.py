@@ -17,6 +17,8 @@ SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 FLOOR = "floor"
 REST = "rest"
 """Keyframe of the rest pose of an animator's skeleton, where it is not the standing pose."""
+ORIGIN = "character.toml"
+"""File of a creature folder that says where the character's own file was (`importer/origin.py`)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -78,8 +80,9 @@ class Creature:
 
     @property
     def digest(self) -> str:
-        """Hash of the files that define the body; the README does not count."""
-        text = "\0".join(f"{name}\0{self.files[name]}" for name in sorted(self.files))
+        """Hash of the files that define the body; the README and `character.toml` do not count."""
+        names = sorted(set(self.files) - {ORIGIN})
+        text = "\0".join(f"{name}\0{self.files[name]}" for name in names)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     @property

@@ -21,6 +21,7 @@ from mjxgait.creature.anatomy import (
 from mjxgait.creature.creature import (
     FLOOR,
     HINGE,
+    ORIGIN,
     SLIDE,
     Creature,
 )
@@ -49,7 +50,8 @@ def load_creature(folder: Path) -> Creature:
     toml, xml = folder / "creature.toml", folder / "creature.xml"
     settings = build(CreatureSettings, read_toml(toml), str(toml))
     try:
-        files = {path.name: read_text(path, MOST_TEXT) for path in (toml, xml)}
+        texts = [toml, xml] + [path for path in [folder / ORIGIN] if path.is_file()]
+        files = {path.name: read_text(path, MOST_TEXT) for path in texts}
         _check_alone(xml, files["creature.xml"])
         model = mujoco.MjModel.from_xml_string(files["creature.xml"])
     except (ValueError, mujoco.FatalError) as error:

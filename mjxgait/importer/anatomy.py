@@ -145,7 +145,7 @@ class Anatomy:
     m, xrot [B, 3, 3]: bodies in it. root: body id. bodies: ids of the creature's bodies, parents
     first. active: ids of joints that move. feet: ids of the last moving body of each leg. scale: m
     per unit of length. shapes: of each body. lowered: whether qpos has the limbs let down instead
-    of the file's zero pose.
+    of the file's zero pose. swinging: ids of the joints by which arms swing.
     """
 
     spec: mujoco.MjSpec
@@ -159,6 +159,7 @@ class Anatomy:
     scale: float
     shapes: dict[int, list[Shape]]
     lowered: bool = False
+    swinging: Sequence[int] = ()
 
     def low(self, bodies: Sequence[int]) -> float:
         """Lowest point in m of some bodies; the lowest body frame where they have no shapes."""

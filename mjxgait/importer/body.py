@@ -5,6 +5,7 @@ Letters: `J` active joints, `B` bodies in the list's order (MuJoCo's ids less on
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -51,7 +52,7 @@ class KinematicModel:
     parent: [B] places of the parents, -1 for the trunk. shapes: of each body. low, high: [J] limits
     in rad, infinite where there is none. feet: for each foot the places of its bodies. source: [J]
     joint ids in the file. effort: [J] N·m, nan where the file states none. in_plane: whether the
-    file lets the trunk move in a plane only.
+    file lets the trunk move in a plane only. arms: [J] whether a joint swings an arm.
     """
 
     def __init__(
@@ -61,8 +62,14 @@ class KinematicModel:
         source: list[int],
         effort: np.ndarray,
         in_plane: bool,
+        swinging: Sequence[int] = (),
     ) -> None:
-        """Compile the editable model. feet: place of each foot's last moving body."""
+        """Compile the editable model.
+
+        Args:
+          feet: place of each foot's last moving body. swinging: ids in the file of arms' joints.
+        """
+        self.arms = np.isin(source, swinging)
         self.spec, self.source, self.effort, self.in_plane = spec, source, effort, in_plane
         self.model = compiled(spec)
         self.data = mujoco.MjData(self.model)
@@ -82,7 +89,10 @@ class KinematicModel:
     def copy(self) -> "KinematicModel":
         """Return a copy, compiled anew, that can be edited on its own."""
         feet = [group[0] for group in self.feet]
-        return KinematicModel(self.spec.copy(), feet, self.source, self.effort, self.in_plane)
+        swinging = np.array(self.source)[self.arms]
+        return KinematicModel(
+            self.spec.copy(), feet, self.source, self.effort, self.in_plane, swinging.tolist()
+        )
 
     def welded(self, i: int) -> list[int]:
         """Return a moving body and the bodies fixed to it."""

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import geometry
+from mjxgait.creature.creature import ORIGIN
 from mjxgait.creature.geometry import posed
 from mjxgait.creature.settings import RigSettings
 from mjxgait.errors import UserError, listed
@@ -24,6 +25,7 @@ from mjxgait.importer.orient import (
     is_planar,
     yaw_to,
 )
+from mjxgait.importer.origin import origin_files
 from mjxgait.importer.read import source_of
 from mjxgait.importer.robots import find_robot, robot_name
 from mjxgait.importer.source import Source
@@ -44,7 +46,7 @@ from mjxgait.importer.worker import (
 )
 from mjxgait.importer.write_toml import GAIT, creature_toml
 
-XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
+XML, TOML, README, _ = WRITTEN = ("creature.xml", "creature.toml", "README.md", ORIGIN)
 """Files of a creature folder that an import makes."""
 NATURAL = (4, 6, 8)
 """Numbers of feet on which a character has a natural gait unless it is given another."""
@@ -135,7 +137,9 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     joints = add_joints(model, anatomy, source.efforts, notes)
     add_bones(anatomy.spec, notes)
     feet = [anatomy.bodies.index(b) for b in anatomy.feet]
-    kinematics = KinematicModel(anatomy.spec, feet, *joints, in_plane(model, anatomy.root))
+    kinematics = KinematicModel(
+        anatomy.spec, feet, *joints, in_plane(model, anatomy.root), anatomy.swinging
+    )
     start = first_pose(kinematics, model, anatomy)
     kinematics.turn(yaw_to(find_forward(kinematics, start, choices.forward, notes)))
     rest = kinematics.qpos(np.zeros(len(kinematics.joints))) if source.up else None
@@ -148,7 +152,8 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     if rest is not None:
         rest[:3] = best.qpos[:3]
     rig = _rig(path, source, model, anatomy)
-    return _folder(_name(path, choices), rig, best, mirror, planar, rest)
+    imported = _folder(_name(path, choices), rig, best, mirror, planar, rest)
+    return dataclasses.replace(imported, files=imported.files | origin_files(path, rig))
 
 
 def _compiled(source: Source, choices: ImportChoices, notes: Notes) -> mujoco.MjModel:
@@ -176,9 +181,12 @@ def _balance(best: Candidate, source: Source, root: str, planar: bool) -> None:
     soles = {name for foot in best.feet for name in foot}
     body = best.kinematics
     steady_balance(best.drive, body.names, body.model, best.qpos, soles, best.notes)
-    if source.bones and not planar:
+    if planar:
+        return
+    if source.bones:
         step_if_narrow(body, best.q, best.drive, best.notes)
-        swing_arms(body, best.drive, source.swings, best.notes)
+    arms = {name for name, arm in zip(body.names, body.arms, strict=True) if arm}
+    swing_arms(body, best.drive, source.swings | arms, best.notes)
 
 
 def _name(path: Path, choices: ImportChoices) -> str:

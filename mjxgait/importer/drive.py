@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.errors import listed
+from mjxgait.importer.arms import ratios
 from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.notes import Confidence, Notes
 from mjxgait.importer.roles import one_sided, ranges_of, roles_of
@@ -151,15 +152,21 @@ def swing_arms(
 ) -> None:
     """Let each arm that can move swing with the leg of the other side.
 
-    swings: joints by which arms swing.
+    swings: joints by which arms swing; those of one arm together turn it about the y axis.
     """
-    names, axes = kinematics.names, kinematics.data.xaxis[1:]
-    for j, name in enumerate(names):
-        side = float(kinematics.data.xanchor[j + 1][1])
-        legs = [leg for leg, weight in drive.stride.items() if weight * side < 0]
-        if name in swings and legs:
-            same = float(np.sign(axes[j] @ axes[names.index(legs[0])]))
-            drive.swing[name] = (legs[0], same * ARM)
+    names, axes, data = kinematics.names, kinematics.data.xaxis[1:], kinematics.data
+    mujoco.mj_comPos(kinematics.model, data)
+    for left in (1, -1):
+        arm = [j for j, n in enumerate(names) if n in swings and left * data.xanchor[j + 1][1] > 0]
+        legs = [leg for leg, weight in drive.stride.items() if left * weight < 0]
+        if not (arm and legs):
+            continue
+        shoulder = int(kinematics.model.jnt_bodyid[arm[0] + 1])
+        along = data.subtree_com[shoulder] - data.xanchor[arm[0] + 1]
+        turns, _ = ratios(axes[arm], along, np.array([0.0, 1.0, 0.0]))
+        same = float(np.sign(axes[names.index(legs[0])][1]))
+        for j, turn in zip(arm, turns, strict=True):
+            drive.swing[names[j]] = (legs[0], round(same * ARM * float(turn), 3))
     if drive.swing:
         arms = listed(list(drive.swing))
         notes.guess("swing", arms, "medium", "arms swing with the leg of the other side")

@@ -1,5 +1,7 @@
 """Anatomy of a compiled model; models that cannot be a creature are refused."""
 
+import dataclasses
+import itertools
 from collections.abc import Sequence
 
 import mujoco
@@ -17,6 +19,7 @@ from mjxgait.importer.anatomy import (
     unit_length,
     up_axis,
 )
+from mjxgait.importer.arms import arms_of, hung, shoulder_of
 from mjxgait.importer.legs import (
     NoLegs,
     find_feet,
@@ -71,6 +74,8 @@ def find_anatomy(
         anatomy.feet = find_feet(model, anatomy, movable, limbs)
         if len(anatomy.feet) < 2:  # an arm on its base can reach down too
             raise UserError(str(error)) from None
+    if limbs is None:
+        anatomy = _with_arms(model, anatomy, movable, axis, notes)
     _choose_joints(model, anatomy, movable, keep, notes)
     _check_loops(model, anatomy)
     return anatomy
@@ -117,14 +122,37 @@ def _check_patterns(model: mujoco.MjModel, keep: Sequence[str], freeze: Sequence
             matching(pattern, names, "joint of the file", option)
 
 
+def _with_arms(
+    model: mujoco.MjModel,
+    anatomy: Anatomy,
+    movable: list[int],
+    axis: np.ndarray,
+    notes: Notes,
+) -> Anatomy:
+    """Return the anatomy of a figure on two legs with arms that hang and may swing."""
+    arms = arms_of(model, anatomy, movable)
+    if not arms:
+        return anatomy
+    pose = hung(model, anatomy, arms)
+    shoulders = [shoulder_of(model, anatomy, pose, arm) for arm in arms]
+    changed = measured(model, pose, axis, anatomy.scale, anatomy.spec, anatomy.shapes)
+    swinging = sorted(itertools.chain(*shoulders)) if all(shoulders) else []
+    names = listed([model.body(arm.bodies[0]).name for arm in arms])
+    notes.guess(f"arms from {names} on", "hang", "medium", "a figure on two legs lets them hang")
+    return dataclasses.replace(
+        changed, feet=anatomy.feet, lowered=anatomy.lowered, swinging=swinging
+    )
+
+
 def _choose_joints(
     model: mujoco.MjModel, anatomy: Anatomy, movable: list[int], keep: Sequence[str], notes: Notes
 ) -> None:
-    """Activate the joints between the trunk and a foot, and those that the user keeps."""
+    """Activate the joints between the trunk and a foot, shoulders, and those that the user keeps."""
     on_legs = {b for foot in anatomy.feet for b in ancestors(model, foot)}
     frozen = []
     for j in movable:
-        if model.jnt_bodyid[j] in on_legs or matches(model.joint(j).name, keep):
+        walks = model.jnt_bodyid[j] in on_legs or j in anatomy.swinging
+        if walks or matches(model.joint(j).name, keep):
             anatomy.active.append(j)
         else:
             frozen.append(model.joint(j).name or f"joint {j}")

@@ -146,7 +146,7 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
             if int(model.jnt_bodyid[j]) in ancestors(model, end) and int(model.jnt_type[j]) == HINGE
         ]
         adr = model.jnt_qposadr[joints]
-        low, high = _reach(model, joints, data.qpos[adr])
+        low, high = limits_around(model, joints, data.qpos[adr])
         clouds = [(b, s) for b in subtree(model, end) for s in anatomy.shapes[b]]
 
         def height(
@@ -164,11 +164,11 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
             return float((np.concatenate(points) @ up.T)[:, 2].min())
 
         best = min((rng.uniform(low, high) for _ in range(DRAWS)), key=height)
-        data.qpos[adr] = _descended(height, best, low, high)
+        data.qpos[adr] = descended(height, best, low, high)
     return data.qpos.copy()
 
 
-def _reach(
+def limits_around(
     model: mujoco.MjModel, joints: list[int], q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper bounds [J] in rad of the joint search around the current pose."""
@@ -182,7 +182,7 @@ def _reach(
     return np.minimum(*ends), np.maximum(*ends)
 
 
-def _descended(
+def descended(
     height: Callable[[np.ndarray], float], q: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
     """Descend from `q` to a pose [J] that no single joint can lower: alike legs end alike."""

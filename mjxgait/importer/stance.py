@@ -172,7 +172,9 @@ class Search:
     def run(self, sampling: Sampling, seed: int) -> np.ndarray:
         """Return the best pose [J] found."""
         rng, beside = np.random.default_rng(seed), sampling.beside
-        mean, width = self.start.copy(), np.full(len(self.start), sampling.spread)
+        # Arms hang; they must not balance the body.
+        free = ~self.kinematics.arms
+        mean, width = self.start.copy(), sampling.spread * free
         best, least = mean, self.cost(mean, beside)
         for i in range(ROUNDS):
             shape = (SAMPLES, len(mean))
@@ -188,7 +190,7 @@ class Search:
             if costs[order[0]] < least:
                 best, least = poses[order[0]], float(costs[order[0]])
             elite = np.array([poses[i] for i in order])
-            mean, width = elite.mean(0), elite.std(0) + 1e-3
+            mean, width = elite.mean(0), (elite.std(0) + 1e-3) * free
         return best
 
     def stretch(self, q: np.ndarray) -> float:

@@ -69,7 +69,7 @@ def offered_poses(
     source: Source,
     start: np.ndarray,
 ) -> list[tuple[str, np.ndarray]]:
-    """Poses that the file offers, each with its description."""
+    """Poses that the file offers, each with its description; arms hang in all."""
     order = sorted(
         range(model.nkey),
         key=lambda k: (
@@ -86,7 +86,9 @@ def offered_poses(
         if len(p) == model.nq
     ]
     poses.append(("limbs let down" if anatomy.lowered else "the file's zero pose", start))
-    return [(what, q) for what, q in poses if np.isfinite(q).all()]
+    return [
+        (what, np.where(kinematics.arms, start, q)) for what, q in poses if np.isfinite(q).all()
+    ]
 
 
 def _angles(kinematics: KinematicModel, model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:

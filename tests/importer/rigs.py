@@ -81,11 +81,13 @@ def glb(
     thick: float = 0.03,
     handles: bool = True,
     soles: bool = False,
+    paws: Mapping[str, float] | None = None,
 ) -> bytes:
     """A mesh of rings about each bone that follow it alone, below an armature in centimetres.
 
     thick: m, radius of the rings. handles: a root on the floor, and a bone that moves no skin.
-    soles: also a point above and one below the end of each limb.
+    soles: also a point above and one below the end of each limb. paws: m by bone, by which that below
+    is further down.
     """
     document = gltf.GLTF2(asset=gltf.Asset(version="2.0"))
     buffer = Buffer(document)
@@ -111,7 +113,8 @@ def glb(
             points.append(rings)
             joints.append(np.full(len(rings), i))
         if soles and end:
-            points.append(0.01 * np.array(end) + thick * np.array([[0, 1, 0], [0, -1, 0]]))
+            deep = thick + (paws or {}).get(name, 0.0)
+            points.append(0.01 * np.array(end) + np.array([[0, thick, 0], [0, -deep, 0]]))
             joints.append(np.full(2, i))
     _add_skin(document, buffer, world, np.concatenate(points), np.concatenate(joints), handles)
     document.scenes = [gltf.Scene(nodes=[len(document.nodes) - 2, len(document.nodes) - 1])]
