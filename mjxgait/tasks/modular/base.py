@@ -31,6 +31,8 @@ FASTEST_HINGE, FASTEST, FURTHEST = 20.0, 5.0, 0.08
 """rad/s, m/s, rad past a hinge's range."""
 LITTLE = 1e-6
 """Least divisor: momentum exchanged with the water in kg·m/s, squared joint speeds in (rad/s)²."""
+NEAR = 1e-6
+"""Least product in m² of the two halves of a way that have directions."""
 SHARPNESS = 3
 """Exponent of the cost of vibration and of a jumper's depth: little costs less, much costs more.
 
@@ -49,12 +51,14 @@ def own(sensed: Sensed) -> ModularSensed:
 class LocomotionStats(EpisodeStats):
     """Extension of `EpisodeStats`.
 
-    settled, place: [3] m, centre of mass when counting began, and now.
+    settled, halfway, place: [3] m, centre of mass when counting began, after half of the time that
+    counts, and now.
     light: [3] m, its place. gained: [] m, way towards its former place. since: [] step from which
     the way counts. None without a light.
     """
 
     settled: jax.Array
+    halfway: jax.Array
     place: jax.Array
     light: jax.Array | None
     gained: jax.Array | None
@@ -130,6 +134,7 @@ class LocomotionTask(ModularTask):
             "reason": none,
             "overlap": jnp.zeros(()),
             "settled": nowhere,
+            "halfway": nowhere,
             "place": nowhere,
             "light": None if self.dark is None else jnp.asarray(self.dark),
             "gained": None if self.dark is None else jnp.zeros(()),
@@ -139,13 +144,27 @@ class LocomotionTask(ModularTask):
     def update(
         self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Any
     ) -> Any:
-        """The place now, and when counting began."""
+        """The place now, halfway, and when counting began."""
+        half = (params + self.horizon) // 2
         return dataclasses.replace(
             stats,
             steps=stats.steps + 1,
             settled=jnp.where(stats.steps <= params, own(sensed).com, stats.settled),
+            halfway=jnp.where(stats.steps <= half, own(sensed).com, stats.halfway),
             place=own(sensed).com,
         )
+
+    def curved(self, stats: LocomotionStats) -> jax.Array:
+        """Share [] that a way loses by its curve: 1 less the cosine of the turn between its halves.
+
+        On a circle, a path of twice this length ends this much nearer than twice as far.
+        """
+        first, second = (
+            (end - begin)[: self.axes]
+            for begin, end in ((stats.settled, stats.halfway), (stats.halfway, stats.place))
+        )
+        far = length(first) * length(second)
+        return 1 - jnp.clip(jnp.sum(first * second) / jnp.maximum(far, NEAR), 0.0, 1.0)
 
     def speed(self, stats: LocomotionStats, settings: ModularConfig) -> jax.Array:
         """Speed [] in m/s over the time that counts, even if the episode ended early."""

@@ -27,18 +27,20 @@ class ModularConfig:
 
 @dataclasses.dataclass(frozen=True)
 class SwimWeights:
-    """Weight of each term; `overlap` and `elsewhere` are penalties.
+    """Weight of each term; all but `speed` are penalties.
 
     Attributes:
       speed: m/s, in a straight line.
       overlap: part of the speed lost by blocks in each other.
       elsewhere: part of the rest lost by momentum that the water did not give.
+      curve: part of the rest lost by a way that turns: 1 less the cosine between its halves.
     """
 
     __pydantic_config__ = STRICT
     speed: NonNegative = 1.0
     overlap: NonNegative = 1.0
     elsewhere: NonNegative = 1.0
+    curve: Annotated[NonNegative, ADDED] = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,6 +67,7 @@ class RoamWeights:
       overlap: part of the speed lost by blocks in each other or in the ground.
       balance: part of the rest lost by tipping over.
       vibration: part of the rest lost by joints that vibrate.
+      curve: part of the rest lost by a way that turns, as of swimmers.
     """
 
     __pydantic_config__ = STRICT
@@ -72,6 +75,7 @@ class RoamWeights:
     overlap: NonNegative = 1.0
     balance: NonNegative = 1.0
     vibration: Annotated[NonNegative, ADDED] = 0.0
+    curve: Annotated[NonNegative, ADDED] = 0.0
 
 
 @dataclasses.dataclass(frozen=True)

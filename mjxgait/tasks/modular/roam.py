@@ -75,7 +75,7 @@ class Roam(LocomotionTask):
         )
 
     def evaluate(self, stats: RoamStats, settings: RoamConfig) -> Mapping[str, jax.Array]:
-        """The speed; its loss by overlap; of the rest by tipping over, of that rest by vibration.
+        """The speed; its loss by overlap, then of each rest by tipping over, vibration, and curves.
 
         Blocks overlap each other or the ground.
         """
@@ -90,6 +90,7 @@ class Roam(LocomotionTask):
             "overlap": earned * inside,
             "balance": earned * tipped,
             "vibration": earned * vibrates,
+            "curve": earned * (1 - inside - tipped - vibrates) * self.curved(stats),
         }
 
 

@@ -71,10 +71,16 @@ class Swim(LocomotionTask):
         )
 
     def evaluate(self, stats: SwimStats, settings: SwimConfig) -> Mapping[str, jax.Array]:
-        """The speed; its loss by overlap; the loss of the rest by foreign momentum."""
+        """The speed; its loss by overlap; of the rest by foreign momentum, of that rest by curves."""
         speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
         inside = lost(stats.overlap / settings.overlap)
         share = stats.lacking / jnp.maximum(stats.exchanged, LITTLE)
         elsewhere = (1 - inside) * lost(share / settings.elsewhere)
-        return {"speed": speed, "overlap": earned * inside, "elsewhere": earned * elsewhere}
+        curve = (1 - inside - elsewhere) * self.curved(stats)
+        return {
+            "speed": speed,
+            "overlap": earned * inside,
+            "elsewhere": earned * elsewhere,
+            "curve": earned * curve,
+        }

@@ -34,6 +34,7 @@ from mjxgait.tasks.modular.config import JumpConfig, RoamConfig
 from mjxgait.tasks.modular.follow import Following, FollowInWater, FollowOnLand, Light
 from mjxgait.tasks.modular.jump import LYING, Jump
 from mjxgait.tasks.modular.roam import Roam
+from mjxgait.tasks.modular.swim import Swim
 from mjxgait.tasks.starts import NEVER
 from mjxgait.training.experiment import Experiment, build_experiment
 
@@ -249,6 +250,28 @@ def test_tipping_over_costs_speed(task: Roam):
     assert leaning["balance"] == pytest.approx(leaning["speed"] / 2, rel=1e-3)
     assert over["balance"] > 0.9 * over["speed"]
     assert leaning["overlap"] == 0
+
+
+@pytest.mark.parametrize("kind", [Roam, Swim])
+@pytest.mark.parametrize("turn", [0.0, 90.0, 150.0, 240.0])
+def test_a_way_in_a_curve_costs_what_twice_its_length_would_lose(
+    task: Roam, kind: type[Roam | Swim], turn: float
+):
+    """On a circle: turned by so many degrees in the time that counts, at 1 m/s."""
+    own = kind(task.creature, task.step, task.horizon, task.ends)
+    settings, still = own.Settings(settle=0.5, apart=0.0), np.zeros(3, np.float32)
+    stats, params, update = own.init(), own.params(settings), updating(own)
+    begin = int(params)
+    rate = np.radians(turn) / (own.horizon - 1 - begin)
+    place = np.zeros(3)
+    for k in range(own.horizon):
+        stats = update(stats, moment({"com": np.float32(place)}), still, params, ())
+        angle = rate * (k + 0.5 - begin)
+        if k >= begin:
+            place = place + own.step * np.array([np.cos(angle), np.sin(angle), 0.0])
+    found = {name: float(value) for name, value in own.evaluate(stats, settings).items()}
+    kept = max(np.cos(np.radians(turn) / 2), 0.0)
+    assert found["curve"] == pytest.approx((1 - kept) * found["speed"], abs=0.02)
 
 
 def test_joints_that_vibrate_cost_speed(task: Roam):
