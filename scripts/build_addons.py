@@ -1,8 +1,7 @@
 """Build the add-ons for other programs as files to install: `python scripts/build_addons.py --out DIR`.
 
-Writes `mjxgait-blender-VERSION.zip`, for Blender's "Install from Disk", and
-`mjxgait-godot-VERSION.zip`, to unpack in the folder of a Godot project. The same files make the same
-bytes.
+Writes `mjxgait-blender-VERSION.zip`, for Blender's "Install from Disk", and the same for Godot, Unity
+and Unreal, to unpack in the folder of a project. The same files make the same bytes.
 """
 
 import argparse
@@ -16,15 +15,15 @@ from mjxgait.files import write_bytes, writing
 
 ROOT = Path(__file__).parents[1]
 ADDONS = ROOT / "addons"
-PLACES = {"blender": "", "godot": "addons/"}
+PLACES = {"blender": "", "godot": "addons/", "unity": "Assets/", "unreal": "Content/Python/"}
 """Folder of each add-on's files in its archive."""
-KINDS = (".py", ".toml", ".gd", ".cfg", ".md", ".svg")
+KINDS = (".py", ".toml", ".gd", ".cfg", ".cs", ".md", ".svg")
 DATE = (1980, 1, 1, 0, 0, 0)
 """Of all files; the earliest that an archive can state."""
 
 
 def main() -> None:
-    """Write both archives and print their names."""
+    """Write the archives and print their names."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True, help="folder for the archives")
     out = parser.parse_args().out

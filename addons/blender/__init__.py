@@ -1,6 +1,7 @@
 """Blender add-on: an armature learns to walk by the installed program `mjxgait`.
 
-`commands.py` and `job.py` do without Blender: command lines, and the processes that run them.
+`commands.py`, `job.py` and `footfalls.py` do without Blender: command lines, the processes that run
+them, and the footfalls that a file states.
 `scene.py` moves characters and motions between Blender and files; `ui.py` has operators and panel.
 Blender has a Python of its own, so nothing here imports the package mjxgait.
 """

@@ -13,6 +13,7 @@ import bpy
 from mathutils import Matrix, Quaternion
 
 from .commands import NotStarted
+from .footfalls import footfalls_in
 
 STILL = 1e-5
 """Change of a number of a bone's pose below which the bone gets no key frames for it."""
@@ -76,7 +77,7 @@ def bring_motion(armature: Any, file: Path, name: str, called: str) -> tuple[Any
       file: GLB with the same character. name: of the animation. called: the new action's name.
 
     Returns:
-      The action, and the names of bones that the armature lacks.
+      The action, with a pose marker at each footfall, and the names of bones that the armature lacks.
 
     Raises:
       NotStarted: the file has not this animation.
@@ -92,7 +93,13 @@ def bring_motion(armature: Any, file: Path, name: str, called: str) -> tuple[Any
         poses = _poses(scene, armature, brought, first, last)
         lost = [bone.name for bone in brought.pose.bones if bone.name not in armature.pose.bones]
         scene.frame_set(was)
-    return _keyed(armature, poses, called, scene.frame_start), lost
+    made = _keyed(armature, poses, called, scene.frame_start)
+    frames_per_s = scene.render.fps / scene.render.fps_base
+    stretched = (len(poses) - 1) / max(last - first, 1.0)
+    for foot, time in footfalls_in(file, name):
+        marker = made.pose_markers.new(foot)
+        marker.frame = scene.frame_start + round(time * frames_per_s * stretched)
+    return made, lost
 
 
 def _poses(

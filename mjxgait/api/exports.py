@@ -1,5 +1,6 @@
 """The champion's walk as a file for other programs: animation, numbers, one page."""
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,11 +13,14 @@ from mjxgait.training.folder import require_output
 
 if TYPE_CHECKING:
     from mjxgait.animation.export import Character, WalkLoop
+    from mjxgait.importer.origin import Found
     from mjxgait.rendering.walk import Walk
 
 KINDS = (".glb", ".bvh", ".usda", ".usdc", ".csv", ".json")
 NUMBERS = (".csv", ".json")
 PAGES = (".html", ".htm")
+ONTO, CAPSULES = ".glb", "none"
+"""End of a file with a character; and what is given instead of one."""
 Tell = Callable[[str], object]
 
 
@@ -35,7 +39,8 @@ def export(
 
     Args:
       out: the file; its ending chooses the format.
-      onto: the character (GLB) that the creature was imported from.
+      onto: the character (GLB) that the creature was imported from; by default the file that was
+        imported, if it is still there. "none" writes the body of capsules.
       rate: key frames per second.
       travelling: moves the root forward.
       tell: called with what was written, and with doubts about the walk.
@@ -44,21 +49,32 @@ def export(
       UserError: no champion, a wrong ending, or the file cannot be written.
     """
     from mjxgait.animation.export import read_character, walk_loop
+    from mjxgait.animation.export.facts import examined
+    from mjxgait.importer.origin import Found, find_character
     from mjxgait.rendering.video import LOOP_SECONDS, champion_of
     from mjxgait.rendering.walk import doubt
 
     folder, file = folder_of(run), path_of(out)
-    over = None if onto is None else path_of(onto)
+    over = None if onto is None or str(onto) == CAPSULES else path_of(onto)
     _check_names(file, over)
     require_output(file)
     character = None if over is None else read_character(over)
     walk = champion_of(folder, LOOP_SECONDS).walk
-    said = (
-        _numbers(walk, file)
-        if file.suffix.lower() in NUMBERS
-        else _animation(walk_loop(walk, rate), character, file, travelling)
-    )
-    tell(f"{sized(file)}: {said}")
+    notes: list[str] = []
+    if file.suffix.lower() in NUMBERS:
+        said = _numbers(walk, file)
+    else:
+        loop = dataclasses.replace(walk_loop(walk, rate), certificate=examined(folder, walk))
+        if file.suffix.lower() != ONTO or over is not None:
+            said = _animation(loop, character, file, travelling)
+        else:
+            own = find_character(walk.creature, folder)
+            _check_names(file, own.file)
+            said, notes = _by_itself(
+                loop, Found(None) if onto is not None else own, file, travelling
+            )
+    for line in (f"{sized(file)}: {said}", *notes):
+        tell(line)
     if doubts := doubt(folder, walk):
         tell(doubts)
     return file
@@ -163,13 +179,35 @@ def _animation(loop: "WalkLoop", character: "Character | None", out: Path, trave
     return f"{called}{strides}, {seconds:.2f} s at {rate} frames/s, {speed:.2f} m/s"
 
 
+def _by_itself(
+    loop: "WalkLoop", own: "Found", out: Path, travelling: bool
+) -> tuple[str, list[str]]:
+    """Write the loop onto the creature's own character, or else its body of capsules.
+
+    Return what was written, and notes: a walk that does not fit its character is written all the
+    same, because no file was given.
+    """
+    from mjxgait.animation.export import read_character
+
+    notes = [f"{out}: {own.note}"] if own.note and own.file is None else []
+    if own.file is not None:
+        try:
+            said = _animation(loop, read_character(own.file), out, travelling)
+        except UserError as error:
+            notes = [f"{out}: shows the body of capsules, because {error}"]
+        else:
+            whose = f"on your character {own.file}; --onto {CAPSULES} writes the body of capsules"
+            return said, [f"{out}: {whose}", *([own.note] if own.note else [])]
+    return _animation(loop, None, out, travelling), notes
+
+
 def _check_names(out: Path, onto: Path | None) -> None:
     """Refuse a kind of file that is not written, and to write over the character."""
     require_ending(out, KINDS)
     kind = out.suffix.lower()
     if onto is None:
         return
-    if kind != ".glb":
+    if kind != ONTO:
         raise UserError(f"{out}: with --onto a character is written; end the name with .glb")
     if out.exists() and onto.exists() and out.samefile(onto):
         raise UserError(f"{out}: is your character, which stays; name another file with --out")

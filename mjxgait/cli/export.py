@@ -22,7 +22,8 @@ class ExportOptions:
       out: File to write, ending with .glb, .bvh, .usda or .usdc; .csv or .json for
         numbers.
       onto: The character (GLB) that the creature was imported from; the file gets the walk as one
-        more animation of it, in its own axes and units.
+        more animation of it, in its own axes and units. By default the file that was imported, if
+        it is still there; "none" writes the body of capsules.
       rate: Key frames per second.
       travelling: Move the root forward; otherwise the creature walks in place.
     """

@@ -90,6 +90,7 @@ def said(armature: bpy.types.Object) -> dict[str, object]:
         "range": list(action.frame_range),
         "cyclic": action.use_cyclic,
         "mode": bpy.context.mode,
+        "markers": sorted((marker.name, marker.frame) for marker in action.pose_markers),
     }
 
 

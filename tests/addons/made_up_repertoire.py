@@ -6,8 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.animation.export import build_clips, standing_still, stride_in_phase
-from mjxgait.experiments.repertoire.clips import CLIPS, IDLE, TABLE, animation_of, table_of
+from mjxgait.animation.export import (
+    animation_of,
+    build_clips,
+    contacts,
+    standing_still,
+    stride_in_phase,
+)
+from mjxgait.experiments.repertoire.clips import CLIPS, IDLE, TABLE
+from mjxgait.experiments.repertoire.table import table_of
 from mjxgait.rendering.walk import record_walk
 from mjxgait.training.folder import open_champion
 
@@ -26,6 +33,8 @@ def write_repertoire(folder: Path, turns: bool = True) -> dict:
         for turn in ((0.0, TURN, -TURN) if turns else (0.0,))
     }
     table = table_of(CLIPS, loops, [], travelling=False)
+    for clip in table["clips"]:
+        clip["contacts"] = contacts(loops[clip["name"]], fast.walk.creature.feet.names)
     clips = {animation_of(name, loop): loop for name, loop in loops.items()}
     (folder / CLIPS).write_bytes(build_clips(clips))
     (folder / TABLE).write_text(json.dumps(table))

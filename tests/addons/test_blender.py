@@ -20,6 +20,7 @@ from importer.rigs import glb
 import mjxgait
 from addons.blender import commands
 from addons.blender.commands import Choices, NotStarted, Progress, progress_after
+from addons.blender.footfalls import footfalls_in
 from addons.blender.job import LOG, Job
 from mjxgait.processes import safe_environment
 
@@ -37,7 +38,8 @@ def build(folder: Path) -> list[Path]:
 
 
 def test_the_archives_hold_what_their_programs_expect(tmp_path: Path):
-    blender, godot = build(tmp_path / "dist")
+    made = build(tmp_path / "dist")
+    blender, godot, unity, unreal = made
     with zipfile.ZipFile(blender) as packed:
         manifest = tomllib.loads(packed.read("blender_manifest.toml").decode())
         assert {"__init__.py", "ui.py", "scene.py", "LICENSE"} <= {*packed.namelist()}
@@ -45,10 +47,15 @@ def test_the_archives_hold_what_their_programs_expect(tmp_path: Path):
     with zipfile.ZipFile(godot) as packed:
         assert {name.split("/")[:2][-1] for name in packed.namelist()} == {"mjxgait"}
         assert "addons/mjxgait/plugin.cfg" in packed.namelist()
-    assert [path.read_bytes() for path in build(tmp_path / "again")] == [
-        blender.read_bytes(),
-        godot.read_bytes(),
-    ]
+    for file, script in (
+        (unity, "Assets/mjxgait/Editor/RepertoireImporter.cs"),
+        (unreal, "Content/Python/mjxgait/import_repertoire.py"),
+    ):
+        with zipfile.ZipFile(file) as packed:
+            assert script in packed.namelist()
+            assert "UNTRIED" in packed.read(script).decode().splitlines()[0]
+    again = build(tmp_path / "again")
+    assert [path.read_bytes() for path in again] == [path.read_bytes() for path in made]
 
 
 def test_choices_become_options():
@@ -193,6 +200,22 @@ def blender_python() -> str:
     return named
 
 
+def test_footfalls_are_read_from_the_file(tmp_path: Path):
+    file = tmp_path / "walk.glb"
+    document = gltf.GLTF2(asset=gltf.Asset(version="2.0"))
+    falls = [{"foot": "Paw", "down": 0.25, "up": 0.5}, {"foot": "Hand", "down": 0.0, "up": 0.3}]
+    document.animations = [
+        gltf.Animation(name="idle"),
+        gltf.Animation(name="walk-loop", extras={"contacts": falls}),
+    ]
+    document.set_binary_blob(b"\0\0\0\0")
+    file.write_bytes(b"".join(document.save_to_bytes()))
+    assert footfalls_in(file, "walk") == [("Paw", 0.25), ("Hand", 0.0)]
+    assert footfalls_in(file, "idle") == footfalls_in(file, "run") == []
+    file.write_bytes(file.read_bytes()[:30])
+    assert footfalls_in(file, "walk") == []
+
+
 @pytest.fixture(scope="module")
 def used(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
     """What the buttons did, in words, and the folder with Blender's exports."""
@@ -215,11 +238,26 @@ def used(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
 def test_the_button_makes_an_action(used: tuple[dict, Path]):
     told, _ = used
     assert told["installed"] == told["walked"] == told["fixed"] == ["FINISHED"]
-    assert told["said"].startswith("walk: Not certified: it has not been examined"), "export's line"
-    assert told["action"] == {"name": "walk", "range": [1, 16], "cyclic": True, "mode": "POSE"}
+    assert told["said"].startswith("walk: Not certified: "), "export's line"
+    assert "it has not been examined" in told["said"]
+    action = told["action"]
+    markers = action.pop("markers")
+    assert action == {"name": "walk", "range": [1, 16], "cyclic": True, "mode": "POSE"}
+    assert len(markers) >= 3
+    assert markers == [[*mark] for mark in footfalls_by_frame(used[1])]
     assert told["left_behind"] == 0
     assert told["kept"] == ["walk", "walk, fixed"]
     assert "no such program" in told["absent"]
+
+
+def footfalls_by_frame(folder: Path) -> list[tuple[str, int]]:
+    """Foot and frame of each footfall that the first run's file states."""
+    first = min((folder / "runs").iterdir(), key=lambda path: path.stat().st_mtime)
+    (walk,) = gltf.GLTF2.load(str(first / commands.WALK)).animations
+    return sorted(
+        (fall["foot"], 1 + round(walk.extras["frames_per_s"] * fall["down"]))
+        for fall in walk.extras["contacts"]
+    )
 
 
 @pytest.mark.slow

@@ -37,6 +37,13 @@ def test_the_version_is_the_programs():
     assert (ADDON / plugin["plugin"]["script"].strip('"')).exists()
 
 
+@pytest.mark.parametrize("script", sorted([*ADDON.glob("*.gd"), HERE / "godot" / "game.gd"]))
+def test_scripts_are_of_the_language(script: Path):
+    """Without a Godot, a parser of its language at least finds what no Godot would read."""
+    parser = pytest.importorskip("gdtoolkit.parser", reason="needs the Python package gdtoolkit")
+    parser.parser.parse(script.read_text())
+
+
 def project(folder: Path, turns: bool) -> dict:
     """Write a project with the add-on and a repertoire; return the repertoire's table."""
     shutil.copytree(HERE / "godot", folder, dirs_exist_ok=True)
@@ -125,6 +132,10 @@ def test_a_character_goes_where_it_is_driven(tmp_path: Path):
     assert max(ahead["slid"], sharp["slid"]) < 0.35
     assert curve["slid"] < 0.5
     assert min(part["bone_turned"] for part in (ahead, curve, sharp)) > 0.05
+    # One step per foot and cycle, though clips are blended.
+    feet = {fall["foot"] for fall in fast["contacts"]}
+    assert {*ahead["steps"]} == feet
+    assert max(ahead["steps"].values()) <= 2.0 * ahead["pace"] + 2
     assert (still["speed"], still["pace"]) == (0.0, 1.0)
     assert still["bone_turned"] < 1e-3
 

@@ -2,13 +2,16 @@
 
 import dataclasses
 import json
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 import pygltflib as gltf
 import pytest
+from animation import test_glb
 from animation.skinned import PICTURE, frames_of, parts, skin_at, styled, transform, treading_loop
 from animation.test_glb import read
 from importer.rigs import DOG, bvh, glb
@@ -22,14 +25,13 @@ from mjxgait.creature.scale import load_files
 from mjxgait.experiments.repertoire.clips import CLIPS, TABLE, write_clips
 from mjxgait.importer import ImportChoices, import_model
 
+validate = test_glb.validate  # the fixture
 ARMATURES = {
     "in centimetres": transform(size=0.01),
     "turned": transform((1.5, 0.0, -0.4), Rotation.from_euler("y", 90, degrees=True), 0.01),
     "of metres": transform(size=0.01),
 }
 """Transform of the armature above bones in cm; the turned character looks along +X."""
-SKIN = 0.01 * 2 - 0.03
-"""m; the lowest vertices at rest, those of all paws."""
 BY_MATRIX = {"in centimetres": (), "turned": ("Armature", "Hips", "LeftShin"), "of metres": ()}
 
 
@@ -143,14 +145,16 @@ def test_each_vertex_moves_as_the_simulated_body(case: Case, travelling: bool):
     vertices, body, bones = seen(case, document, name), Body(case), bones_of_vertices(document)
     rest = read(document, document.meshes[0].primitives[0].attributes.POSITION)
     hip = case.loop.walk.creature.frame.hip_height * body.unit
-    worst = 0.0
+    off = np.zeros_like(vertices)
     for frame, shown in enumerate(vertices):
         gone = travelling * case.loop.advance * frame / (len(vertices) - 1)
         for part in DOG:
             own = bones == part
-            expected = body.moved(rest[own], part, frame, gone)
-            worst = max(worst, np.abs(shown[own] - expected).max())
-    assert worst < 0.001 * hip
+            off[frame, own] = shown[own] - body.moved(rest[own], part, frame, gone)
+    off[..., 1] -= np.median(off[..., 1])  # raised as a whole, until the paws are on the floor
+    on_legs = np.array([name.startswith(("Left", "Right")) for name in bones])
+    assert np.abs(off[:, ~on_legs]).max() < 0.001 * hip
+    assert np.abs(off).max() < 0.005 * hip
     moved = np.ptp(vertices, axis=0).max(0)
     assert (moved > 0.02 * hip).any(), "the walk moves"
 
@@ -172,7 +176,7 @@ def test_feet_stand_on_the_floor_and_slide_no_more_than_the_bodys(case: Case):
             here = vertices[frame % count, own]
             low = here[:, 1].argmin()
             height = body.unit * body.lowest(case.loop.qpos[frame % count], fall["foot"])[2]
-            assert abs(here[low, 1] - SKIN - height) < 0.01 * hip
+            assert abs(here[low, 1] - height) < 0.01 * hip
             assert abs(height) < 0.02 * hip  # it sinks in, or leaves for a moment
             if frame + 1 <= last and frame % count + 1 <= count:
                 after = vertices[frame % count + 1, own[low]]
@@ -189,6 +193,23 @@ def simulated_slide(body: Body, part: str, frame: int) -> float:
     after = later + turned @ turn.T @ (low - at)
     step = loop.advance / (len(loop.qpos) - 1)
     return body.unit * float(np.linalg.norm((after - low)[:2] + step * loop.walk.forward))
+
+
+@pytest.mark.parametrize("travelling", [False, True])
+def test_the_validator_finds_nothing_that_was_not_in_the_file(
+    case: Case, validate: Callable[[Path], dict[str, Any]], tmp_path: Path, travelling: bool
+):
+    out, plain = tmp_path / "walk.glb", tmp_path / "plain.glb"
+    export_onto(case.loop, read_character(case.file), out, travelling)
+    assert seen_by(validate(out)) == seen_by(validate(case.file))
+    plain.write_bytes(glb(soles=True))
+    export_onto(case.loop, read_character(plain), out, travelling)
+    assert [validate(file)["numErrors"] for file in (plain, out)] == [0, 0]
+
+
+def seen_by(issues: dict[str, Any]) -> list[tuple[str, str]]:
+    """Code and place of each error and warning."""
+    return sorted((m["code"], m["pointer"]) for m in issues["messages"] if m["severity"] < 2)
 
 
 def test_all_of_the_file_stays_and_the_animation_follows(case: Case):
@@ -276,7 +297,8 @@ def test_reading_it_back_gives_the_same_angles(case: Case, tmp_path: Path):
     export_onto(case.loop, read_character(case.file), out)
     brought = bring(creature, out, tolerance=np.radians(90.0))
     angles = case.loop.qpos[:, creature.joints.qpos_adr]
-    assert brought.track.angles == pytest.approx(angles, abs=np.radians(0.5))
+    # A knee bends a little more where the simulated paw sinks in.
+    assert brought.track.angles == pytest.approx(angles, abs=np.radians(1.5))
 
 
 def test_stances_are_counted_across_the_seam():
@@ -303,7 +325,7 @@ def test_footfalls_are_where_the_feet_are_down(case: Case):
 
 
 def test_a_repertoire_is_written_onto_the_character(case: Case, tmp_path: Path):
-    """All clips move the same bones; each shows what it shows alone."""
+    """All clips move the same bones; each shows what it shows alone, with one height for all."""
     before = tmp_path / "before.glb"
     export_onto(case.loop, read_character(case.file), before)  # so that a name is taken
     loops = {"idle": standing_still(case.loop), "walk": case.loop}
@@ -320,6 +342,8 @@ def test_a_repertoire_is_written_onto_the_character(case: Case, tmp_path: Path):
     )
     assert idles == walks
     alone, again = (seen(case, document, name) for name in ("walk-loop", "walk_2-loop"))
-    np.testing.assert_allclose(again, alone, atol=1e-6)
+    off = again - alone
+    off[..., 1] -= np.median(off[..., 1])
+    assert np.abs(off).max() < 0.005 * case.loop.walk.creature.frame.hip_height * Body(case).unit
     assert np.ptp(seen(case, document, "idle"), axis=0).max() < 1e-6
     assert PICTURE in files[0].read_bytes()

@@ -1,15 +1,18 @@
 # A repertoire: the table that `mjxgait repertoire` writes, and its clips as a blend space.
 #
-# Places in the blend space are (turn, speed), each over its largest value, so that triangles are not
-# slivers. Within a triangle Godot blends clips by the same weights that `weights` returns.
+# Places in the blend space are (turn, speed), each over its largest value, so that triangles are
+# not slivers. Within a triangle Godot blends clips by the same weights that `weights` returns.
 extends RefCounted
 
 const SCHEMA = 1
 const LOOP = "-loop"
+const IDLE = "idle"
+const FADE = 0.1  # s between a walk and a start or stop
 
 var error = ""
 var file = ""
 var clips = []  # dictionaries of the table
+var ways = []  # starts and stops of the table that were found
 var largest = Vector2.ONE  # deg/s, m/s
 var points = PackedVector2Array()
 var triangles = PackedInt32Array()
@@ -29,6 +32,9 @@ func _init(path: String):
 	else:
 		file = path.get_base_dir().path_join(table["file"])
 		clips = table["clips"]
+		for way in table.get("transitions", []):
+			if way.get("found", false):
+				ways.append(way)
 		_place()
 
 
@@ -107,6 +113,48 @@ func pace(shares: PackedFloat32Array) -> float:
 	return speed / stride if stride > 1e-6 else 1.0 / seconds
 
 
+# The start to a walk, or the stop from it; an empty one if it has none.
+func way_of(clip: Dictionary, stops: bool) -> Dictionary:
+	for way in ways:
+		var ends = [way["to"], way["from"]] if stops else [way["from"], way["to"]]
+		if ends == [IDLE, clip["name"]]:
+			return way
+	return {}
+
+
+# The walk with a start, or with a stop, that is nearest to a speed; an empty one without any.
+func nearest_with_way(wanted: float, stops: bool) -> Dictionary:
+	var best = {}
+	for clip in clips:
+		if way_of(clip, stops).is_empty():
+			continue
+		if best.is_empty() or absf(clip["speed"] - wanted) < absf(best["speed"] - wanted):
+			best = clip
+	return best
+
+
+# The clip with the largest share.
+func leading(shares: PackedFloat32Array) -> String:
+	var most = 0
+	for i in shares.size():
+		if shares[i] > shares[most]:
+			most = i
+	return clips[most]["name"]
+
+
+# Gives all animations a track that calls `method(clip, foot)` at footfalls, on the node at `path`.
+func add_footfalls(player: AnimationPlayer, path: NodePath, method: String):
+	for clip in clips + ways:
+		var animation = player.get_animation(animation_of(clip, player))
+		if animation.find_track(path, Animation.TYPE_METHOD) >= 0:
+			continue  # of another character with the same file, or of the same clip
+		var track = animation.add_track(Animation.TYPE_METHOD)
+		animation.track_set_path(track, path)
+		for fall in clip.get("contacts", []):
+			var key = {"method": method, "args": [clip["name"], fall["foot"]]}
+			animation.track_insert_key(track, minf(fall["down"], animation.length), key)
+
+
 # The animation of a clip; Godot's importer takes the ending from the name.
 func animation_of(clip: Dictionary, player: AnimationPlayer) -> String:
 	var name = clip.get("animation", clip["name"])
@@ -114,8 +162,9 @@ func animation_of(clip: Dictionary, player: AnimationPlayer) -> String:
 
 
 # A blend tree: all clips in one phase, one cycle per second, and a factor on that pace behind.
-# Returns null and sets `error` if the file lacks a clip.
-func blend_tree(player: AnimationPlayer) -> AnimationNodeBlendTree:
+# Returns null and sets `error` if the file lacks a clip. root: track of the bone that starts and
+# stops move.
+func blend_tree(player: AnimationPlayer, root: NodePath) -> AnimationNodeBlendTree:
 	var space = AnimationNodeBlendSpace2D.new()
 	space.auto_triangles = false
 	space.min_space = Vector2(-1.0, minf(points[0].y, -1.0))
@@ -137,7 +186,35 @@ func blend_tree(player: AnimationPlayer) -> AnimationNodeBlendTree:
 		space.add_triangle(triangles[t], triangles[t + 1], triangles[t + 2])
 	var tree = AnimationNodeBlendTree.new()
 	tree.add_node("walk", space)
+	tree.add_node("seek", AnimationNodeTimeSeek.new())
+	tree.connect_node("seek", 0, "walk")
 	tree.add_node("pace", AnimationNodeTimeScale.new())
-	tree.connect_node("pace", 0, "walk")
-	tree.connect_node("output", 0, "pace")
+	tree.connect_node("pace", 0, "seek")
+	_add_ways(tree, player, root)
 	return tree
+
+
+# Starts and stops are played once, over the walk: "way" is the motion, "once" plays it. Those that
+# do not move the root are left out, for they would leave the character's body behind.
+func _add_ways(tree: AnimationNodeBlendTree, player: AnimationPlayer, root: NodePath):
+	var moving = []
+	for one in ways:
+		var name = animation_of(one, player)
+		if not player.has_animation(name):
+			continue
+		if player.get_animation(name).find_track(root, Animation.TYPE_POSITION_3D) >= 0:
+			moving.append(one)
+	ways = moving
+	if ways.is_empty():
+		tree.connect_node("output", 0, "pace")
+		return
+	var once = AnimationNodeOneShot.new()
+	once.fadein_time = FADE
+	once.fadeout_time = FADE
+	var way = AnimationNodeAnimation.new()
+	way.animation = animation_of(ways[0], player)
+	tree.add_node("way", way)
+	tree.add_node("once", once)
+	tree.connect_node("once", 0, "pace")
+	tree.connect_node("once", 1, "way")
+	tree.connect_node("output", 0, "once")

@@ -2,6 +2,7 @@
 
 from mjxgait.animation.export.bvh import build_bvh, export_bvh
 from mjxgait.animation.export.character import Character, read_character
+from mjxgait.animation.export.facts import examined
 from mjxgait.animation.export.footfalls import contacts
 from mjxgait.animation.export.glb import (
     build_clips,
@@ -10,7 +11,9 @@ from mjxgait.animation.export.glb import (
     export_glb,
 )
 from mjxgait.animation.export.loop import (
+    LOOP,
     WalkLoop,
+    animation_of,
     falls_of_first_foot,
     resampled,
     standing_still,
@@ -18,7 +21,7 @@ from mjxgait.animation.export.loop import (
     walk_loop,
     walk_take,
 )
-from mjxgait.animation.export.onto import LOOP, bones_of, build_onto, export_onto
+from mjxgait.animation.export.onto import bones_of, build_onto, export_onto
 from mjxgait.animation.export.usd import export_usd
 from mjxgait.animation.export.viewpoint import viewpoint
 
@@ -26,6 +29,7 @@ __all__ = [
     "LOOP",
     "Character",
     "WalkLoop",
+    "animation_of",
     "bones_of",
     "build_bvh",
     "build_clips",
@@ -33,6 +37,7 @@ __all__ = [
     "build_glb",
     "build_onto",
     "contacts",
+    "examined",
     "export_bvh",
     "export_glb",
     "export_onto",

@@ -4,14 +4,14 @@ Letters: `N` nodes of the file.
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.clips.clip import read_bytes, written
-from mjxgait.animation.clips.glb_document import DAMAGED, Part, damaged, open_glb
+from mjxgait.animation.clips.glb_document import DAMAGED, Document, Part, damaged, open_glb
 from mjxgait.animation.clips.read_glb import name_of, placed, skin_of, worlds
 from mjxgait.errors import UserError
 
@@ -20,20 +20,26 @@ from mjxgait.errors import UserError
 class Character:
     """A GLB file and its nodes.
 
-    data: its bytes. parents: [N] -1 for none. order: [N] parents first. local, world: [N, 4, 4] at
-    rest against the parent, and in the scene. bones: nodes by name, those of the largest skin.
-    clips: names of the animations.
+    data: its bytes. document: its description. parents: [N] -1 for none. order: [N] parents first.
+    local, world: [N, 4, 4] at rest against the parent, and in the scene. bones: nodes by name,
+    those of the largest skin. clips: names of the animations.
     """
 
     path: Path
     data: bytes
-    nodes: tuple[Part, ...]
+    document: Document
     parents: tuple[int, ...]
     order: tuple[int, ...]
     local: np.ndarray
     world: np.ndarray
     bones: Mapping[str, tuple[int, ...]]
     clips: frozenset[str]
+
+    @property
+    def nodes(self) -> Sequence[Part]:
+        """The nodes [N]."""
+        found: Sequence[Part] = self.document.nodes
+        return found
 
     def above(self, node: int) -> list[int]:
         """The nodes above a node, from its parent on."""
@@ -71,5 +77,5 @@ def read_character(path: Path) -> Character:
         raise damaged(path) from error
     if not np.isfinite(world).all():
         raise UserError(f"{path}: the place of a node is not a finite number; export it again")
-    data, tree = read_bytes(path), (tuple(nodes), tuple(parents), tuple(order))
-    return Character(path, data, *tree, local, world, bones, clips)
+    tree = tuple(parents), tuple(order)
+    return Character(path, read_bytes(path), document, *tree, local, world, bones, clips)

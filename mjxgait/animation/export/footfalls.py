@@ -19,7 +19,8 @@ BRIEF = 0.03
 class Footfall:
     """A time in s for which a foot of the creature carries weight.
 
-    down: within the loop. up: later than the loop's end if the foot is down across its seam.
+    down: within the motion. up: in a loop later than its end if the foot is down across the seam;
+    else the end if the foot is still down there.
     """
 
     foot: int
@@ -28,16 +29,22 @@ class Footfall:
 
 
 def footfalls(loop: WalkLoop) -> list[Footfall]:
-    """The footfalls of a loop in the order of `down`; a foot that never leaves has one."""
+    """The footfalls in the order of `down`; a foot that never leaves has one.
+
+    There are none without recorded frames, as of the standing pose.
+    """
     walk, (first, last) = loop.walk, loop.frames
+    if first == last:
+        return []
     carries = walk.recording.contact[first:last]
     carries = np.roll(carries, -round(loop.begins * len(carries)), axis=0)
     step = float(loop.times[-1]) / (last - first)
     brief = max(round(BRIEF / step), 1)
+    stances_of = stances if loop.strides else stances_once
     found = [
         Footfall(foot, round(down * step, 4), round(up * step, 4))
         for foot, own in enumerate(carries.T)
-        for down, up in stances(own, brief)
+        for down, up in stances_of(own, brief)
     ]
     return sorted(found, key=lambda fall: (fall.down, fall.foot))
 
@@ -65,3 +72,12 @@ def stances(carries: np.ndarray, brief: int) -> list[tuple[int, int]]:
     ends = np.flatnonzero(~down & np.roll(down, 1))
     ends = np.append(ends, ends[:1] + count)
     return [(int(begin), int(ends[ends > begin][0])) for begin in begins]
+
+
+def stances_once(carries: np.ndarray, brief: int) -> list[tuple[int, int]]:
+    """Return the same of a motion [T] that does not repeat: its last stance ends with it."""
+    widened = binary_closing(np.pad(carries, 2 * brief, mode="edge"), np.ones(brief))
+    down = binary_opening(widened, np.ones(brief))[2 * brief : -2 * brief]
+    edges = np.diff(np.concatenate([[False], down, [False]]).astype(int))
+    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    return [(int(begin), int(end)) for begin, end in zip(begins, ends, strict=True)]

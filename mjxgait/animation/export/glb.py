@@ -14,10 +14,10 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.clips.clip import NOTE
+from mjxgait.animation.export.facts import CONTACTS, facts_of, measured_facts
 from mjxgait.animation.export.floor import add_tiles
-from mjxgait.animation.export.footfalls import contacts
-from mjxgait.animation.export.gltf import Buffer, add_channel, facts_of
-from mjxgait.animation.export.loop import WalkLoop
+from mjxgait.animation.export.gltf import Buffer, add_channel
+from mjxgait.animation.export.loop import WalkLoop, animation_of
 from mjxgait.animation.export.scenery import add_scenery
 from mjxgait.animation.export.shaped import material_of, shaped
 from mjxgait.animation.export.skeleton import (
@@ -34,6 +34,8 @@ from mjxgait.animation.export.surface import Piece, along_limbs, pieces_of
 from mjxgait.champion.serializers import serializer_of
 from mjxgait.files import write_bytes, writing
 
+WALK = "walk"
+"""Name of an exported walk; see `animation_of`."""
 SAMPLES = 120
 """Samples of a cycle's motion, as many as the reader uses."""
 
@@ -82,15 +84,17 @@ def build_glb(
     """The bytes of the file.
 
     travelling: the root moves forward at an even speed; otherwise the creature walks in place.
-    floor: what is around it passes; see `add_scenery`. footfalls: the animation states when feet are down.
+    floor: what is around it passes; see `add_scenery`. footfalls: the file states the gait, and when
+    feet are down.
     """
-    document, buffer = _scene({"walk": loop}, travelling)
+    document, buffer = _scene({animation_of(WALK, loop): loop}, travelling)
     if floor:
         add_scenery(document, buffer, loop)
-    document.extras = facts_of(loop, travelling)
+    facts = facts_of(loop, travelling)
     if footfalls:
-        feet = loop.walk.creature.feet.names
-        document.animations[0].extras = {"contacts": contacts(loop, feet)}
+        facts = measured_facts(loop, travelling, loop.walk.creature.feet.names)
+        document.animations[0].extras = facts
+    document.extras = {key: fact for key, fact in facts.items() if key != CONTACTS}
     # Blender keeps a node's extras and drops the file's.
     document.nodes[0].extras = document.extras | note_of(loop)
     buffer.close()
@@ -100,9 +104,12 @@ def build_glb(
 def build_clips(loops: Mapping[str, WalkLoop], travelling: bool = False) -> bytes:
     """The bytes of a file with several loops of one creature as animations, by name.
 
-    All move the same joints, so that programs can blend them.
+    All move the same joints, so that programs can blend them. Each states its facts and footfalls.
     """
     document, buffer = _scene(loops, travelling)
+    for animation, loop in zip(document.animations, loops.values(), strict=True):
+        feet = loop.walk.creature.feet.names
+        animation.extras = measured_facts(loop, travelling, feet)
     buffer.close()
     return b"".join(document.save_to_bytes())
 

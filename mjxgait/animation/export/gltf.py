@@ -16,7 +16,6 @@ from mjxgait.animation.clips.glb_document import (
     VERSION,
     read_chunks,
 )
-from mjxgait.animation.export.loop import WalkLoop
 
 KINDS = {
     np.dtype(np.uint8): gltf.UNSIGNED_BYTE,
@@ -70,16 +69,6 @@ class Buffer:
         self.blob += bytes(-len(self.blob) % 4)
         self.document.buffers = [gltf.Buffer(byteLength=len(self.blob))]
         self.document.set_binary_blob(bytes(self.blob))
-
-
-def facts_of(loop: WalkLoop, travelling: bool, units: float = 1.0) -> dict[str, Any]:
-    """The facts of a loop that files state. units: of the file, per m."""
-    return {
-        "strides": loop.strides,
-        "speed_m_per_s": units * loop.speed,
-        "frames_per_s": loop.rate,
-        "travelling": travelling,
-    }
 
 
 def add_channel(

@@ -14,6 +14,8 @@ from mjxgait.errors import UserError
 from mjxgait.reference.measure import falls_of_feet
 from mjxgait.rendering.walk import Walk
 
+LOOP = "-loop"
+"""End of an animation's name, by which Godot plays it in a loop."""
 MOST_STRIDES = 4
 TOLERANCE = 0.01
 """Relative change of speed, from the fit to whole frames, above which another stride is added."""
@@ -43,6 +45,7 @@ class WalkLoop:
     path: np.ndarray | None = None
     begins: float = 0.0
     climb: float = 0.0
+    certificate: str = ""
 
     @property
     def times(self) -> np.ndarray:
@@ -54,6 +57,16 @@ class WalkLoop:
         """Mean speed in m/s."""
         ahead = np.hypot(self.advance, self.climb) if self.climb else self.advance
         return float(ahead / self.times[-1])
+
+    @property
+    def way(self) -> float:
+        """Way ahead in m, from the first frame to the last."""
+        return self.advance if self.path is None else float(self.path[-1] @ self.walk.forward)
+
+
+def animation_of(name: str, loop: WalkLoop) -> str:
+    """Return the name of a clip's animation in a file: a loop's ends with `LOOP`."""
+    return f"{name}{LOOP}" if loop.strides else name
 
 
 def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
@@ -235,10 +248,10 @@ def falls_of_first_foot(walk: Walk) -> np.ndarray:
 
 
 def standing_still(like: WalkLoop) -> WalkLoop:
-    """One second of the standing pose; it is not simulated."""
+    """One second of the standing pose; it is not simulated, so it has no recorded frames."""
     creature: Creature = like.walk.creature
     stand = creature.stand_qpos.copy()
     place = creature.root_qpos
     stand[place : place + 2] = 0.0
     qpos = np.tile(stand, (like.rate + 1, 1))
-    return dataclasses.replace(like, qpos=qpos, strides=0, advance=0.0, stretched=1.0, turned=0.0)
+    return WalkLoop(like.walk, qpos, like.rate, 0, 0.0, 1.0, (0, 0))

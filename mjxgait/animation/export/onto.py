@@ -6,7 +6,6 @@ from its rest as its part does. Letters: `F` key frames, `B` parts that have a b
 the file.
 """
 
-import dataclasses
 import itertools
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
@@ -18,9 +17,12 @@ from scipy.spatial.transform import Rotation
 from mjxgait.animation.clips.glb_document import DAMAGED, damaged
 from mjxgait.animation.clips.read_glb import name_of
 from mjxgait.animation.export.character import Character
-from mjxgait.animation.export.footfalls import contacts
-from mjxgait.animation.export.gltf import Buffer, add_channel, added, facts_of
-from mjxgait.animation.export.loop import WalkLoop
+from mjxgait.animation.export.facts import measured_facts
+from mjxgait.animation.export.fit import Fit, fitted, lows, quoted
+from mjxgait.animation.export.gltf import Buffer, add_channel, added
+from mjxgait.animation.export.loop import LOOP, WalkLoop, animation_of
+from mjxgait.animation.export.planted import planted
+from mjxgait.animation.export.posed import Goal, posed
 from mjxgait.animation.export.skeleton import (
     STILL,
     gltf_axes,
@@ -31,18 +33,11 @@ from mjxgait.animation.export.skeleton import (
     world_poses,
 )
 from mjxgait.creature import Creature
-from mjxgait.creature.geometry import DOWN, geom_reach, posed
-from mjxgait.errors import UserError, listed
+from mjxgait.errors import UserError
 from mjxgait.files import write_bytes, writing
 
-LOOP = "-loop"
-"""End of the animation's name, by which Godot plays it in a loop."""
-SLACK = 0.01
-"""Hip heights by which a bone may be off its part at rest."""
 EVEN = 1e-3
 """Relative difference of two scales, from which a bone below them would be sheared."""
-SHOWN = 4
-"""Number of bones that a message names."""
 
 
 def export_onto(loop: WalkLoop, character: Character, path: Path, travelling: bool = False) -> str:
@@ -51,10 +46,11 @@ def export_onto(loop: WalkLoop, character: Character, path: Path, travelling: bo
     Raises:
       UserError: the file has not the creature's skeleton, or cannot be written.
     """
-    names, data = build_onto({f"walk{LOOP}": loop}, character, travelling)
+    name = animation_of("walk", loop)
+    names, data = build_onto({name: loop}, character, travelling)
     with writing(path):
         write_bytes(path, data)
-    return names[f"walk{LOOP}"]
+    return names[name]
 
 
 def build_onto(
@@ -73,11 +69,14 @@ def build_onto(
     loop = next(iter(loops.values()))
     bones = bones_of(loop.walk.creature, character)
     try:
-        fit = _fitted(loop, character, bones)
-        tracks = {
-            name: _tracks(character, _goals(each, character, bones, fit, travelling))
-            for name, each in loops.items()
-        }
+        fit, goals = planted(
+            loops,
+            character,
+            bones,
+            fitted(loop, character, bones),
+            lambda each, fit: _goals(each, character, bones, fit, travelling),
+        )
+        tracks = {name: _tracks(character, own) for name, own in goals.items()}
         return _finished(loops, character, bones, fit, tracks, travelling)
     except DAMAGED as error:
         raise damaged(character.path) from error
@@ -103,102 +102,27 @@ def bones_of(creature: Creature, character: Character) -> dict[str, int]:
     found = {part: character.bones.get(bone, ()) for part, bone in rig.bones.items()}
     if lost := [rig.bones[part] for part, nodes in found.items() if not nodes]:
         raise UserError(
-            f"{character.path}: lacks bones of which {creature.name} was made: {_quoted(lost)}; name "
+            f"{character.path}: lacks bones of which {creature.name} was made: {quoted(lost)}; name "
             f"the file that was imported ({rig.file}), or import this one and train it"
         )
     if twice := [rig.bones[part] for part, nodes in found.items() if len(nodes) > 1]:
         raise UserError(
-            f"{character.path}: has several bones called {_quoted(twice)}; give each its own name, "
+            f"{character.path}: has several bones called {quoted(twice)}; give each its own name, "
             "import the file again, and train it"
         )
     return {part: nodes[0] for part, nodes in found.items()}
 
 
-def _quoted(names: list[str]) -> str:
-    """Names in quotes, and the number of those left out."""
-    return listed([f'"{name}"' for name in names], SHOWN)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Fit:
-    """Where the creature's world lies in the file's scene.
-
-    factor: units of the file per m. turn: [3, 3] from the axes of `gltf_axes`. shift: [3] place of
-    the origin, which is on the floor.
-    """
-
-    factor: float
-    turn: np.ndarray
-    shift: np.ndarray
-
-    def places(self, pos: np.ndarray) -> np.ndarray:
-        """Places [..., 3] in the scene of places in m."""
-        moved: np.ndarray = self.factor * pos @ self.turn.T + self.shift
-        return moved
-
-    def turns(self, rot: np.ndarray) -> np.ndarray:
-        """Rotations [..., 3, 3] in the scene of rotations in the creature's world."""
-        turned: np.ndarray = self.turn @ rot @ self.turn.T
-        return turned
-
-
-def _fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> Fit:
-    """The fit by least squares of the resting creature to the bones at rest.
-
-    Then the floor is moved to where the feet are lowest at rest: a body that bends its knees to
-    stand would else walk above it.
-    """
-    creature = loop.walk.creature
-    skeleton, axes = skeleton_of(creature.model, creature.trunk), gltf_axes(loop.walk.forward)
-    pos, _ = world_poses(creature.rest_model, skeleton, resting(loop)[None], axes)
-    parts = pos[0, [skeleton.names.index(part) for part in bones]]
-    places = character.world[list(bones.values()), :3, 3]
-    own, other = parts - parts.mean(0), places - places.mean(0)
-    factor = float(np.sqrt((other**2).sum() / (own**2).sum()))
-    if factor == 0.0:
-        raise ValueError("all its bones are in one place")
-    turn = Rotation.align_vectors(other, factor * own)[0].as_matrix()
-    plain = Fit(factor, turn, places.mean(0) - factor * turn @ parts.mean(0))
-    off = np.linalg.norm(plain.places(parts) - places, axis=1) / factor
-    hip = creature.frame.hip_height
-    if not (off < SLACK * hip).all():
-        worst = [list(bones)[i] for i in np.argsort(-off) if not off[i] < SLACK * hip]
-        names = _quoted([creature.settings.rig.bones[part] for part in worst])
-        raise UserError(
-            f"{character.path}: at rest its bones {names} are up to {off.max() / hip:.0%} of the hip "
-            f"height off the parts of {creature.name}; name the file that was imported "
-            f"({creature.settings.rig.file}), or import this one and train it"
-        )
-    up = turn @ [0.0, 1.0, 0.0]
-    return dataclasses.replace(plain, shift=plain.shift + factor * _lows_at_rest(loop).min() * up)
-
-
-def _lows_at_rest(loop: WalkLoop) -> np.ndarray:
-    """Heights [F] in m of the lowest points of the feet's geoms in the rest pose."""
-    model = loop.walk.creature.model
-    data = posed(model, resting(loop))
-    geoms = loop.walk.creature.feet.stepping
-    return np.array([-geom_reach(model, data, geom, DOWN) for geom in geoms])
-
-
 def _bones_of_feet(loop: WalkLoop, names_of: Mapping[str, str]) -> list[str]:
     """The bone of each foot that is lowest at rest: of a leg with a fixed paw, the paw."""
-    creature, lows = loop.walk.creature, _lows_at_rest(loop)
+    creature, heights = loop.walk.creature, lows(loop, resting(loop)[None])[0]
     model, feet = creature.model, creature.feet
     found = []
     for foot, name in enumerate(feet.names):
-        lowest = np.where(feet.foot_of == foot, lows, np.inf).argmin()
+        lowest = np.where(feet.foot_of == foot, heights, np.inf).argmin()
         part = model.body(model.geom_bodyid[feet.stepping[lowest]]).name
         found.append(names_of.get(part, names_of.get(name, name)))
     return found
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Goal:
-    """Transforms [F, 4, 4] of a node in the scene. free: whether its place is animated too."""
-
-    world: np.ndarray
-    free: bool
 
 
 def _goals(
@@ -228,6 +152,8 @@ def _goals(
         away = world[:, :3, 3] - fit.shift
         world[:, :3, 3] = fit.places(pos[:, 0]) + (turned[:, 0] @ away[..., None])[..., 0]
         goals[top] = Goal(world, True)
+    for node in goals:
+        _check_scale(character, node)
     return goals
 
 
@@ -242,23 +168,12 @@ Channel = tuple[int, str]
 
 
 def _tracks(character: Character, goals: Mapping[int, Goal]) -> dict[Channel, np.ndarray]:
-    """Values [F, 3 or 4] of the goals' channels; all other nodes rest against their parents."""
-    frames = len(next(iter(goals.values())).world)
-    world = np.zeros((frames, len(character.nodes), 4, 4))
+    """Values [F, 3 or 4] of the goals' channels."""
+    local, _ = posed(character, goals)
     tracks: dict[Channel, np.ndarray] = {}
-    for node in character.order:
-        parent = character.parents[node]
-        above = world[:, parent] if parent >= 0 else np.tile(np.eye(4), (frames, 1, 1))
-        local = np.tile(character.local[node], (frames, 1, 1))
-        if node in goals:
-            _check_scale(character, node)
-            own = np.linalg.solve(above, goals[node].world)
-            local[:, :3, :3] = own[:, :3, :3]
-            if goals[node].free:
-                local[:, :3, 3] = own[:, :3, 3]
-            tracks[node, "rotation"] = _turns(character, node, local)
-            tracks[node, "translation"] = local[:, :3, 3]
-        world[:, node] = above @ local
+    for node in goals:
+        tracks[node, "rotation"] = _turns(character, node, local[:, node])
+        tracks[node, "translation"] = local[:, node, :3, 3]
     return tracks
 
 
@@ -319,8 +234,7 @@ def _finished(
         times = buffer.add(loop.times.astype(np.float32), bounds=True)
         for node, path in moving:
             add_channel(buffer, animation, times, node, path, tracks[name][node, path])
-        falls = contacts(loop, feet) if loop.strides else []
-        animation.extras = facts_of(loop, travelling, fit.factor) | {"contacts": falls}
+        animation.extras = measured_facts(loop, travelling, feet, fit.factor)
         document.animations.append(animation)
     # glTF allows no key frames for a node that is placed by a matrix.
     placed = {node for node, _ in moving if character.nodes[node].matrix}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mjxgait.animation.export.loop import WalkLoop
+from mjxgait.animation.export.loop import WalkLoop, animation_of
 from mjxgait.animation.export.skeleton import (
     Skeleton,
     gltf_axes,
@@ -78,7 +78,7 @@ def _add_skeleton(
     bones.CreateBindTransformsAttr(Vt.Matrix4dArray.FromNumpy(bind))
     local = bind @ np.linalg.inv(above)
     bones.CreateRestTransformsAttr(Vt.Matrix4dArray.FromNumpy(local))
-    motion = UsdSkel.Animation.Define(stage, root.AppendChild("walk"))
+    motion = UsdSkel.Animation.Define(stage, root.AppendChild(_word(animation_of("walk", loop))))
     motion.CreateJointsAttr(paths)
     motion.CreateScalesAttr(Vt.Vec3hArray(len(paths), (1, 1, 1)))
     places, turns = motion.CreateTranslationsAttr(), motion.CreateRotationsAttr()

@@ -6,16 +6,15 @@ Letters: `S` ways to stop, `T` frames, `J` actuated joints.
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mjxgait.animation.export import (
-    LOOP,
     Character,
     WalkLoop,
+    animation_of,
     build_clips,
     build_onto,
     contacts,
@@ -24,14 +23,16 @@ from mjxgait.animation.export import (
     standing_still,
     stride_in_phase,
 )
+from mjxgait.animation.export.facts import UNEXAMINED, certified
 from mjxgait.certification.trials import simulate
-from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.experiments.repertoire.found import Found, found_in
 from mjxgait.experiments.repertoire.grid import Grid
 from mjxgait.experiments.repertoire.neighbours import Blend, Change
+from mjxgait.experiments.repertoire.table import facts_in, make_theirs, table_of
 from mjxgait.files import read_json, write_bytes, write_text
 from mjxgait.reference.changing import HaltingReference
+from mjxgait.reference.outcome import Trajectory
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.video import LOOP_SECONDS, champion_of
 from mjxgait.rendering.walk import WARMUP, Walk
@@ -83,8 +84,9 @@ class Transition:
             "found": True,
             "duration": round(float(self.loop.times[-1]), 6),
             "frames_per_s": self.loop.rate,
-            "way": round(float(self.loop.path[-1] @ self.loop.walk.forward), 4),
+            "way": round(self.loop.way, 4),
             "gaps": [round(gap, 4) for gap in self.gaps],
+            "contacts": contacts(self.loop, self.loop.walk.creature.feet.names),
         }
 
 
@@ -105,10 +107,10 @@ def start_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
         return Transition(IDLE, name)
     stand, after = walk.creature.stand_qpos, loops[name].qpos[0]
     near = [fall for fall in falls if _apart(walk, walk.qpos[fall], after) <= NEAR]
-    chosen = walk.qpos[: int(near[0] if near else _likest(walk, falls, after)) + 1]
-    gaps = (_apart(walk, chosen[0], stand), _apart(walk, chosen[-1], after))
+    last = int(near[0] if near else _likest(walk, falls, after))
+    gaps = (_apart(walk, walk.qpos[0], stand), _apart(walk, walk.qpos[last], after))
     places = np.zeros(2), after[_place(walk)]
-    return Transition(IDLE, name, _motion(walk, chosen, loops[name], places), gaps)
+    return Transition(IDLE, name, _motion(walk, (0, last), loops[name], places), gaps)
 
 
 def stop_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
@@ -124,19 +126,20 @@ def stop_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
     begin = _likest(walk, settled, before)
     stride = float(np.diff(settled).mean()) * walk.time_step
     motions = halted(walk, begin * walk.time_step + stride * np.arange(PLACES) / PLACES)
-    ends = [(frames, row) for row, frames in enumerate(map(len, motions)) if frames]
+    ends = [(len(motion.qpos), row) for row, motion in enumerate(motions) if len(motion.qpos)]
     if not ends:
         return Transition(name, IDLE)
-    chosen = motions[min(ends)[1]][begin:]
-    gaps = (_apart(walk, chosen[0], before), _apart(walk, chosen[-1], stand))
+    halting = motions[min(ends)[1]]
+    frames = begin, len(halting.qpos) - 1
+    gaps = (_apart(walk, halting.qpos[begin], before), _apart(walk, halting.qpos[-1], stand))
     places = before[_place(walk)], np.zeros(2)
-    return Transition(name, IDLE, _motion(walk, chosen, loops[name], places), gaps)
+    return Transition(name, IDLE, _motion(halting, frames, loops[name], places), gaps)
 
 
-def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
-    """Return the poses [T, nq] of each way to stop, until still for `RESTS`.
+def halted(walk: Walk, moments: np.ndarray) -> list[Walk]:
+    """Return each way to stop as a walk that ends when it has been still for `RESTS`.
 
-    There are none after a fall or without coming to rest. moments: [PLACES] s of the command.
+    It has no frames after a fall or without coming to rest. moments: [PLACES] s of the command.
     """
     creature, step = walk.creature, walk.time_step
     halts, fades = (each.ravel() for each in np.meshgrid(moments, FADES))
@@ -152,27 +155,35 @@ def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
     for row, up in enumerate(outcome.stayed_up):
         moves = np.linalg.norm(film.qvel[row, :, root : root + 3], axis=1) >= fastest
         rest = int(np.flatnonzero(moves)[-1]) + 1 + round(RESTS / step)
-        motions.append(film.qpos[row, : rest if up and rest < len(moves) else 0])
+        frames = slice(rest if up and rest < len(moves) else 0)
+        motions.append(dataclasses.replace(walk, trajectory=_part(film, row, frames)))
     return motions
 
 
+def _part(film: Trajectory, row: int, frames: slice) -> Trajectory:
+    """Return some frames of one of several simulations."""
+    arrays = film.qpos, film.qvel, film.torque, film.target, film.phase
+    return Trajectory(film.time_step, *(array[row : row + 1, frames] for array in arrays))
+
+
 def _motion(
-    walk: Walk, qpos: np.ndarray, like: WalkLoop, places: tuple[np.ndarray, np.ndarray]
+    walk: Walk, ends: tuple[int, int], like: WalkLoop, places: tuple[np.ndarray, np.ndarray]
 ) -> WalkLoop:
-    """Return poses [T, nq] as a clip; its root moves as the body moved.
+    """Return the frames of a walk from one to another as a clip; its root moves as the body moved.
 
     places: [2] m, the trunk's place over the root at the clip's begin and end, as in the clips
     before and after.
     """
-    count = max(round((len(qpos) - 1) * walk.time_step * like.rate), 1)
+    first, last = ends
+    count = max(round((last - first) * walk.time_step * like.rate), 1)
     share = np.linspace(0.0, 1.0, count + 1)[:, None]
-    frames = resampled(walk.creature.model, qpos, share[:, 0] * (len(qpos) - 1))
+    frames = resampled(walk.creature.model, walk.qpos, first + share[:, 0] * (last - first))
     place = _place(walk)
     frames[:, place.stop] -= walk.ground_heights(frames[:, place])
     moved, above = frames[:, place] - frames[0, place], (1 - share) * places[0] + share * places[1]
     frames[:, place] = above
-    path, spent = moved - (above - places[0]), (0, len(qpos) - 1)
-    return dataclasses.replace(standing_still(like), qpos=frames, path=path, frames=spent)
+    path = moved - (above - places[0])
+    return WalkLoop(walk, frames, like.rate, 0, 0.0, 1.0, ends, path=path, certificate=UNEXAMINED)
 
 
 def _place(walk: Walk) -> slice:
@@ -192,14 +203,16 @@ def _apart(walk: Walk, one: np.ndarray, other: np.ndarray) -> float:
     return float(np.sqrt(np.mean((one[joints] - other[joints]) ** 2)))
 
 
-SCHEMA = 1
 CLIPS, TABLE = "repertoire.glb", "repertoire.json"
 
 
 def clips_of(folder: Path, found: Sequence[Found], rate: int) -> dict[str, WalkLoop]:
     """Return a stride of each certified walk by name, all in phase, and the standing pose."""
     loops = {
-        one.cell.name: stride_in_phase(champion_of(folder / one.cell.name, LOOP_SECONDS).walk, rate)
+        one.cell.name: dataclasses.replace(
+            stride_in_phase(champion_of(folder / one.cell.name, LOOP_SECONDS).walk, rate),
+            certificate=certified(one.margin or 0.0),
+        )
         for one in found
         if one.certified
     }
@@ -234,75 +247,10 @@ def write_clips(
         data = build_clips(clips, travelling)
     else:
         names, data = build_onto(clips, character, travelling)
-        _rename(document, names, next(iter(loops.values())).walk.creature)
+        make_theirs(document, names, facts_in(data, names.values()))
     with disk_errors(file.parent):
         write_bytes(file, data)
         write_text(table, json.dumps(document, indent=2) + "\n")
-
-
-def _rename(document: dict[str, Any], names: Mapping[str, str], creature: Creature) -> None:
-    """Put the names of a character's animations and bones into the table."""
-    bones = creature.settings.rig.bones
-    for entry in document["clips"]:
-        entry["animation"] = names[entry["animation"]]
-        for fall in entry.get("contacts", []):
-            fall["foot"] = bones.get(fall["foot"], fall["foot"])
-    for entry in document["transitions"]:
-        if entry["found"]:
-            entry["animation"] = names[entry["name"]]
-
-
-def table_of(
-    file: str, loops: dict[str, WalkLoop], found: Sequence[Found], travelling: bool
-) -> dict[str, Any]:
-    """Return the content of `repertoire.json`: each clip's place in a blend space."""
-    walk = next(iter(loops.values())).walk
-    by_name = {one.cell.name: one for one in found}
-    clips = [_entry(name, loop, by_name.get(name)) for name, loop in loops.items()]
-    return {
-        "schema": SCHEMA,
-        "creature": walk.creature.name,
-        "file": file,
-        "units": {"speed": "m/s", "turn": "deg/s, to the left", "duration": "s"},
-        "root_motion": travelling,
-        "begins": f"where {walk.creature.feet.names[0]} comes down",
-        "clips": clips,
-        "not_certified": [
-            {"speed": one.cell.speed, "turn": one.cell.turn, "fails": list(one.fails)}
-            for one in found
-            if not one.certified
-        ],
-    }
-
-
-def animation_of(name: str, loop: WalkLoop) -> str:
-    """Return the name of a clip's animation in the GLB; Godot loops what ends with `LOOP`."""
-    return f"{name}{LOOP}" if loop.strides else name
-
-
-def _entry(name: str, loop: WalkLoop, one: Found | None) -> dict[str, object]:
-    """Return a clip's entry. speed, turn: measured, for blending; asked: the cell's targets."""
-    duration = float(loop.times[-1])
-    entry: dict[str, object] = {
-        "name": name,
-        "animation": animation_of(name, loop),
-        "speed": round(loop.speed, 4),
-        "turn": round(float(np.degrees(loop.turned)) / duration, 3),
-        "duration": round(duration, 6),
-        "frames_per_s": loop.rate,
-        "strides": loop.strides,
-    }
-    if one is None:
-        return entry | {"certified": False, "note": "the standing pose; it was not simulated"}
-    asked = {"speed": one.cell.speed, "turn": one.cell.turn}
-    return entry | {
-        "asked": asked,
-        "certified": one.certified,
-        "gait": one.gait,
-        "duty_factor": round(one.duty or 0.0, 4),
-        "run": name,
-        "contacts": contacts(loop, loop.walk.creature.feet.names),
-    }
 
 
 RATE = 60

@@ -14,6 +14,7 @@ var begun = {}
 var slid = 0.0
 var gone = 0.0
 var poses = []
+var steps = {}
 
 
 func _ready():
@@ -24,6 +25,7 @@ func _ready():
 	set_scene()
 	told["version"] = Engine.get_version_info()["string"]
 	told["error"] = walker.repertoire.error
+	walker.footstep.connect(func(foot): steps[foot] = steps.get(foot, 0) + 1)
 	if walker.tree == null:
 		finish()
 
@@ -63,6 +65,7 @@ func begin():
 	slid = 0.0
 	gone = 0.0
 	poses = []
+	steps = {}
 
 
 # How far the lowest bone of the feet slides, and how far the body goes, once it walks evenly.
@@ -100,6 +103,7 @@ func report() -> Dictionary:
 		"on_floor": walker.is_on_floor(),
 		"pace": walker.tree.get("parameters/pace/scale"),
 		"bone_turned": most,
+		"steps": steps,
 		"slid": slid / gone if gone > 0.01 else 0.0,
 	}
 

@@ -103,6 +103,29 @@ def test_the_root_of_the_file_moves_with_the_body(
     assert start.entry["way"] == pytest.approx(moved @ walk.forward, abs=0.005)
 
 
+def test_footfalls_begin_and_end_with_the_stand(start: Transition, stop: Transition):
+    """All feet are down while the body stands; the stop's are those of its own simulation."""
+    for way, moment in ((start, 0.0), (stop, stop.loop.times[-1] - RESTS)):
+        falls, end = way.entry["contacts"], way.entry["duration"]
+        assert all(0 <= fall["down"] < fall["up"] <= end + 1e-4 for fall in falls)
+        standing = [fall for fall in falls if fall["down"] <= moment + 1e-4 < fall["up"]]
+        assert len(standing) == len({fall["foot"] for fall in standing}) == 4
+        assert len(falls) > 4, "it steps"
+    last = [max(f["up"] for f in falls if f["foot"] == name) for name in {f["foot"] for f in falls}]
+    assert last == pytest.approx([end] * 4, abs=1e-3)
+
+
+def test_the_file_states_the_footfalls_of_starts_and_stops(
+    loops: dict[str, WalkLoop], start: Transition, stop: Transition
+):
+    clips = {**loops, start.name: start.loop, stop.name: stop.loop}
+    animations = gltf.GLTF2.load_from_bytes(build_clips(clips)).animations
+    for way, animation in zip((start, stop), animations[1:], strict=True):
+        assert animation.extras["contacts"] == way.entry["contacts"]
+        assert animation.extras["way_m"] == pytest.approx(way.entry["way"], abs=1e-4)
+        assert animation.extras["certificate"] == "not examined"
+
+
 def root_of(document: gltf.GLTF2, number: int) -> np.ndarray:
     """Translations [F, 3] of the first joint in one animation."""
     animation, root = document.animations[number], document.skins[0].joints[0]
@@ -142,7 +165,7 @@ def test_the_earliest_stop_is_chosen(walk: Walk, stop: Transition):
     moments = np.linspace(2.0, 2.4, PLACES)
     motions = halted(walk, moments)
     assert len(motions) == PLACES * len(FADES)
-    lasts = [len(motion) for motion in motions if len(motion)]
+    lasts = [len(motion.qpos) for motion in motions if len(motion.qpos)]
     assert min(lasts) >= (moments[0] + min(FADES)) / walk.time_step
     assert len(set(lasts)) > 1
     assert stop.loop.times[-1] < (max(lasts) - moments[0] / walk.time_step) * walk.time_step
@@ -150,7 +173,7 @@ def test_the_earliest_stop_is_chosen(walk: Walk, stop: Transition):
 
 def test_a_fall_gives_no_stop(stool: Creature, walk: Walk):
     fallen = dataclasses.replace(walk, champion=falling(stool))
-    assert all(not len(motion) for motion in halted(fallen, np.linspace(2.0, 2.4, PLACES)))
+    assert all(not len(motion.qpos) for motion in halted(fallen, np.linspace(2.0, 2.4, PLACES)))
 
 
 def test_without_lifted_feet_there_are_no_transitions(stool: Creature, loops: dict[str, WalkLoop]):
