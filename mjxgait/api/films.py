@@ -16,12 +16,16 @@ if TYPE_CHECKING:
     from mjxgait.rendering.video import Runner
 
 MOST_RUNNERS = 12
-SIZE = (640, 360)
-"""Pixels of a video."""
+SIZE = (1280, 720)
+"""Pixels of a video, and of a race's still."""
+FPS = 25.0
+SLOWEST, FASTEST = 1, 240
+"""Limits of the frames per second."""
 SECONDS = 5.0
 """Length of a video."""
 Camera = Literal["side", "front", "top", "three-quarter", "follow"]
 Renderer = Literal["auto", "painter", "gl"]
+Background = Literal["scene", "transparent"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,11 +37,12 @@ class Film:
     top: int | None = None
     generations: str | None = None
     seconds: float | None = None
-    fps: int = 25
+    fps: float = FPS
     size: tuple[int, int] | None = None
     camera: Camera | None = None
     slow: float = 1.0
     renderer: Renderer = "auto"
+    background: Background = "scene"
 
 
 def render(
@@ -47,11 +52,12 @@ def render(
     top: int | None = None,
     generations: Sequence[int] | None = None,
     seconds: float | None = None,
-    fps: int = 25,
+    fps: float = FPS,
     size: tuple[int, int] | None = None,
     camera: Camera | None = None,
     slow: float = 1.0,
     renderer: Renderer = "auto",
+    background: Background = "scene",
     tell: Tell = lambda said: None,
 ) -> Path:
     """Make a video or a filmstrip of a champion, or a race of several; return the file.
@@ -60,16 +66,18 @@ def render(
 
     Args:
       run: a run, or several for a race.
-      out: the file: .webp, .gif, .mp4 (extra [video]), or .png for a filmstrip.
+      out: the file: .webp, .gif, .mp4, .mov or .webm (these three: extra [video]), or .png for a
+        filmstrip.
       top: a race of the best so many of the latest population.
       generations: a race of the best of these generations.
       seconds: length of the walk.
-      fps: frames per second.
+      fps: frames per second, 1 to 240, such as 23.976; a .gif holds up to 50.
       size: width and height in pixels.
       camera: position of the camera.
       slow: slow-motion factor.
-      renderer: painter needs no GL; gl is MuJoCo's own; auto uses gl where it works.
-      tell: called with the renderer, the file's size, and doubts about a walk.
+      renderer: auto and painter draw without GL; gl is MuJoCo's own renderer.
+      background: transparent shows only the bodies and their shadow; not for .mp4, nor by gl.
+      tell: called with the GL backend, the file's size, and doubts about a walk.
 
     Raises:
       UserError: no champion, an invalid argument, or the file cannot be written.
@@ -86,6 +94,7 @@ def render(
         camera=camera,
         slow=slow,
         renderer=renderer,
+        background=background,
     )
     write_film(film, os.environ.get("MUJOCO_GL"), tell)
     return film.out
@@ -102,7 +111,8 @@ def write_film(film: Film, wanted: str | None, tell: Tell) -> None:
     from mjxgait.rendering.walk import doubt
 
     generations = _check(film)
-    video.require_writer(film.out, stills=True)
+    clear = film.background == "transparent"
+    video.require_writer(film.out, stills=True, fps=film.fps, clear=clear)
     still = film.out.suffix.lower() == video.STILL
     alone = not (film.top or generations or len(film.runs) > 1)
     seconds = film.seconds or (video.LOOP_SECONDS if still and alone else SECONDS)
@@ -114,7 +124,8 @@ def write_film(film: Film, wanted: str | None, tell: Tell) -> None:
         runners = video.through_generations(film.runs[0], generations, seconds)
     else:
         runners = video.champions_of(film.runs, seconds)
-    stage = Stage([runner.walk for runner in runners], *(film.size or SIZE), film.camera)
+    walks = [runner.walk for runner in runners]
+    stage = Stage(walks, *(film.size or SIZE), film.camera, clear)
     if still:
         _still(runners, stage, film)
     else:
@@ -138,7 +149,7 @@ def _check(film: Film) -> list[int]:
       UserError: an invalid option, by name.
     """
     for name, value, low, high in (
-        ("fps", film.fps, 1, 60),
+        ("fps", film.fps, SLOWEST, FASTEST),
         ("seconds", SECONDS if film.seconds is None else film.seconds, 0.1, 600),
         ("slow", film.slow, 0.1, 100),
         ("size", min(film.size or SIZE), 64, 4096),
@@ -146,11 +157,13 @@ def _check(film: Film) -> list[int]:
         ("top", film.top or 1, 1, MOST_RUNNERS),
     ):
         if not low <= value <= high:
-            raise UserError(f"--{name} {value}: must lie between {low} and {high}")
+            raise UserError(f"--{name} {value:.10g}: must lie between {low} and {high}")
     if not 1 <= len(film.runs) <= MOST_RUNNERS:
         raise UserError(f"name a run folder, or up to {MOST_RUNNERS} for a race")
     if len(film.runs) > 1 and (film.top or film.generations):
         raise UserError("--top and --generations are races of one run; name only that")
+    if film.renderer == "gl" and film.background == "transparent":
+        raise UserError("--renderer gl draws no transparent background; leave out one of the two")
     if film.top and film.generations:
         raise UserError("--top and --generations are two kinds of race; name one of them")
     try:
@@ -168,18 +181,18 @@ def _check(film: Film) -> list[int]:
 
 
 def _backend(stage: "Stage", film: Film, wanted: str | None, tell: Tell) -> str | None:
-    """Return the GL backend to draw with, None for the painter; tell the choice.
+    """Return the GL backend to draw with, and tell it; None for the painter.
 
     Raises:
       UserError: GL was requested and does not work.
     """
-    if film.renderer == "painter":
+    if film.renderer != "gl":
         return None
     from mjxgait.rendering.gl import working_backend
 
     backend, sentence = working_backend(stage, wanted)
-    if backend is None and film.renderer == "gl":
-        raise UserError(f"--renderer gl: GL does not work here, leave the option out; {sentence}")
+    if backend is None:
+        raise UserError(f"--renderer gl: {sentence}; leave the option out")
     tell(sentence)
     return backend
 
@@ -191,9 +204,11 @@ def _still(runners: Sequence["Runner"], stage: "Stage", film: Film) -> None:
     from mjxgait.rendering.filmstrip import filmstrip
 
     if len(runners) == 1:
-        picture = filmstrip(runners[0].walk, size=film.size or EACH, view=film.camera)
+        walk, size = runners[0].walk, film.size or EACH
+        picture = filmstrip(walk, size=size, view=film.camera, clear=stage.clear)
     else:
         picture = stage.picture(stage.frames - 1)
-        video.write_captions(picture, stage, runners, stage.frames - 1)
+        if not stage.clear:
+            video.write_captions(picture, stage, runners, stage.frames - 1)
     with writing(film.out), replaced(film.out) as beside:
         picture.save(beside)

@@ -17,17 +17,19 @@ class RenderOptions:
 
     Attributes:
       runs: Run folder; several champions race, of any creatures.
-      out: File to write: .webp, .gif, .mp4 (extra [video]), or .png for a filmstrip of one stride.
+      out: File to write: .webp, .gif, .mp4, .mov or .webm (these three: extra [video]), or .png for
+        a filmstrip of one stride.
       top: Race of the best N of the latest population.
       generations: Race of the best of each of these generations, such as 0,5,20.
       seconds: Length of the walk; by default 5, for a filmstrip until its stride is steady.
-      fps: Frames per second.
-      size: Width and height in pixels, by default 640 360; for a filmstrip of each picture, by
+      fps: Frames per second, 1 to 240, such as 23.976; a .gif holds up to 50.
+      size: Width and height in pixels, by default 1280 720; for a filmstrip of each picture, by
         default 420 300.
       camera: Camera position; by default at the side, a little to the front and above.
       slow: Slow-motion factor.
-      renderer: painter needs no GPU and no GL library; gl is MuJoCo's own; auto uses gl where it
-        works.
+      renderer: auto and painter need no GPU and no GL library; gl is MuJoCo's own renderer.
+      background: transparent shows only the bodies and their shadow, without text; not for .mp4,
+        nor by gl.
     """
 
     runs: tyro.conf.Positional[Annotated[tuple[Path, ...], tyro.conf.arg(metavar="RUN [RUN ...]")]]
@@ -35,11 +37,12 @@ class RenderOptions:
     top: int | None = None
     generations: str | None = None
     seconds: float | None = None
-    fps: int = 25
+    fps: float = 25.0
     size: tuple[int, int] | None = None
     camera: Literal["side", "front", "top", "three-quarter", "follow"] | None = None
     slow: float = 1.0
     renderer: Literal["auto", "painter", "gl"] = "auto"
+    background: Literal["scene", "transparent"] = "scene"
 
 
 def render_command(arguments: Sequence[str]) -> int:

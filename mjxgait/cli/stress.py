@@ -47,7 +47,7 @@ def stress_command(arguments: Sequence[str]) -> int:
     picture = options.run / "stress"
     with disk_errors(options.run), figure((7.0, 3.6)) as drawing:
         write_text(options.run / STRESS, found.to_json())
-        draw_stress(drawing, found)
+        draw_stress(drawing, found, f"{creature.title}, seed {champion.origin.get('seed')}")
         files = save(drawing, picture, ("png",))
     print(f"{options.run / STRESS}, {files[0]}")
     return 0

@@ -154,7 +154,8 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
         ended = evolve(folder, creature, config, screen, resumed, *at, begin, options.source)
     if ended:
         screen.next_steps(folder, Run(folder).certified)
-    drawn = _draw(folder, screen, all_plots=ended and options.plots)
+    subject = f"{creature.title}, seed {config.seed}"
+    drawn = _draw(folder, screen, subject, all_plots=ended and options.plots)
     return 0 if ended and drawn else INTERRUPTED
 
 
@@ -188,10 +189,10 @@ def _is_multi_seed(folder: Path | None) -> bool:
     return folder is not None and is_multi_seed(folder)
 
 
-def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
+def _draw(folder: Path, screen: "Screen", subject: str, all_plots: bool) -> bool:
     """Draw the run, once its results are on the screen; return False if interrupted."""
     try:
-        _plot_fitness(folder)
+        _plot_fitness(folder, subject)
         if all_plots:
             screen.say(f"Drawing {folder / PLOTS}/; the run itself is done and safe.")
             from mjxgait.rendering.plots import plot_run
@@ -203,7 +204,7 @@ def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
     return True
 
 
-def _plot_fitness(folder: Path) -> None:
+def _plot_fitness(folder: Path, subject: str = "") -> None:
     """Draw the fitness curve; matplotlib is slow to import, so only if there are data."""
     if lines := read_metrics(folder / METRICS):
         from mjxgait.rendering.curves import plot_fitness
@@ -213,7 +214,7 @@ def _plot_fitness(folder: Path) -> None:
             "the run itself is safe",
             f"draw it with {command('plot', folder, run=folder)}",
         ):
-            plot_fitness(lines, folder / PLOT)
+            plot_fitness(lines, folder / PLOT, subject)
 
 
 def _layers(

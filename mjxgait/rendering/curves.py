@@ -65,6 +65,11 @@ def save(drawing: Figure, path: Path, formats: Sequence[str] = FORMATS) -> list[
     return files
 
 
+def titled(subject: str, what: str) -> str:
+    """Return a title: what a plot is of on a line of its own, where that is given."""
+    return f"{subject}\n{what}" if subject else what
+
+
 Lines = Sequence[Line]
 MAIN_TERMS = 7
 """Terms drawn one by one; the others are summed."""
@@ -72,15 +77,15 @@ GREYS = ("0.25", "0.62", "0.82", "0.45", "0.92", "0.72", "0.35", "0.98")
 HATCHES = ("", "///", "", "...", "\\\\\\", "xxx", "---", "")
 
 
-def plot_fitness(lines: Lines, path: Path) -> None:
-    """Write the fitness curve of a run folder as one PNG."""
+def plot_fitness(lines: Lines, path: Path, subject: str = "") -> None:
+    """Write the fitness curve of a run folder as one PNG. subject: see `titled`."""
     with figure((8, 4.5)) as drawing:
-        draw_fitness(drawing.subplots(), lines)
+        draw_fitness(drawing.subplots(), lines, subject)
         with replaced(path) as beside:
             drawing.savefig(beside)
 
 
-def draw_fitness(axes: Axes, lines: Lines) -> None:
+def draw_fitness(axes: Axes, lines: Lines, subject: str = "") -> None:
     """Draw best, mean and any logged quartiles; forced phases are shaded."""
     column = columns(lines)
     generation = column["generation"]
@@ -90,12 +95,16 @@ def draw_fitness(axes: Axes, lines: Lines) -> None:
     axes.plot(generation, column["best"], "-", color=DARK, linewidth=2, label="best")
     axes.plot(generation, column["mean"], "--", color=DARK, linewidth=1.2, label="mean")
     shade_forced(axes, column)
-    axes.set(ylabel="fitness (higher is better)", title="fitness of the population")
+    axes.set(
+        ylabel="fitness (higher is better)", title=titled(subject, "fitness of the population")
+    )
     _label_generations(axes, generation)
     axes.legend(loc="best")
 
 
-def draw_terms(axes: Axes, lines: Lines, weights: Mapping[str, np.ndarray]) -> None:
+def draw_terms(
+    axes: Axes, lines: Lines, weights: Mapping[str, np.ndarray], subject: str = ""
+) -> None:
     """Draw each term's contribution to the best individual's fitness, losses below zero.
 
     weights: signed, one array [generations] per term.
@@ -135,15 +144,13 @@ def draw_terms(axes: Axes, lines: Lines, weights: Mapping[str, np.ndarray]) -> N
     outline = [withStroke(linewidth=5, foreground="white")]
     axes.plot(generation, above + below, color=DARK, linewidth=2, label="sum", path_effects=outline)
     axes.axhline(0, color=DARK, linewidth=0.8)
-    axes.set(
-        ylabel="weight times term",
-        title="what the terms give to the best individual (mean of its starts)",
-    )
+    what = "what the terms give to the best individual (mean of its starts)"
+    axes.set(ylabel="weight times term", title=titled(subject, what))
     _label_generations(axes, generation)
     axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 
 
-def draw_diversity(axes: Axes, lines: Lines) -> None:
+def draw_diversity(axes: Axes, lines: Lines, subject: str = "") -> None:
     """Draw the share of different genomes and the mean spread of a gene."""
     column = columns(lines)
     generation = column["generation"]
@@ -157,7 +164,8 @@ def draw_diversity(axes: Axes, lines: Lines) -> None:
         label="different genomes (left)",
     )
     shade_forced(axes, column)
-    axes.set(ylabel="share of the population", ylim=(0, 1.05), title="diversity")
+    title = titled(subject, "diversity")
+    axes.set(ylabel="share of the population", ylim=(0, 1.05), title=title)
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     spread = axes.twinx()
     spread.plot(
@@ -177,26 +185,31 @@ def draw_diversity(axes: Axes, lines: Lines) -> None:
     axes.legend(handles=handles, loc="lower left")
 
 
-def draw_size(axes: Axes, lines: Lines) -> None:
+def draw_size(axes: Axes, lines: Lines, subject: str = "") -> None:
     """Draw the number of nodes in all expressions of an individual: best and mean."""
     column = columns(lines)
     generation = column["generation"]
     axes.plot(generation, column["nodes_best"], "-", color=DARK, linewidth=2, label="best")
     axes.plot(generation, column["nodes_mean"], "--", color=DARK, linewidth=1.2, label="mean")
     shade_forced(axes, column)
-    axes.set(ylabel="nodes of all expressions", title="size of the programs")
+    axes.set(ylabel="nodes of all expressions", title=titled(subject, "size of the programs"))
     axes.set_ylim(bottom=0)
     _label_generations(axes, generation)
     axes.legend(loc="best")
 
 
-def progress_figures(lines: Lines, weights: Mapping[str, np.ndarray]) -> Figures:
-    """Return the plots of this file by file name."""
-    size: Figures = {"size": ((8, 3.5), lambda drawing: draw_size(drawing.subplots(), lines))}
+def progress_figures(lines: Lines, weights: Mapping[str, np.ndarray], subject: str = "") -> Figures:
+    """Return the plots of this file by file name. subject: see `titled`."""
+    size: Figures = {
+        "size": ((8, 3.7), lambda drawing: draw_size(drawing.subplots(), lines, subject))
+    }
     return {
-        "fitness": ((8, 4.5), lambda drawing: draw_fitness(drawing.subplots(), lines)),
-        "terms": ((9.5, 4.5), lambda drawing: draw_terms(drawing.subplots(), lines, weights)),
-        "diversity": ((8, 3.5), lambda drawing: draw_diversity(drawing.subplots(), lines)),
+        "fitness": ((8, 4.7), lambda drawing: draw_fitness(drawing.subplots(), lines, subject)),
+        "terms": (
+            (9.5, 4.7),
+            lambda drawing: draw_terms(drawing.subplots(), lines, weights, subject),
+        ),
+        "diversity": ((8, 3.7), lambda drawing: draw_diversity(drawing.subplots(), lines, subject)),
         **(size if "nodes_mean" in lines[0] else {}),
     }
 
@@ -223,8 +236,8 @@ def _label_generations(axes: Axes, generation: np.ndarray) -> None:
     axes.set_xlim(generation[0] - 0.5, max(generation[-1], generation[0] + 1) + 0.5)
 
 
-def draw_stress(drawing: Figure, found: Stress) -> None:
-    """Draw the share of starts that passed each trial; dark if sufficient."""
+def draw_stress(drawing: Figure, found: Stress, subject: str = "") -> None:
+    """Draw the share of starts that passed each trial; dark if sufficient. subject: see `titled`."""
     axes = drawing.add_subplot()
     names = [trial.name for trial in found.trials]
     shares = [trial.share for trial in found.trials]
@@ -234,4 +247,4 @@ def draw_stress(drawing: Figure, found: Stress) -> None:
     axes.axvline(found.config.share, color=DARK, linestyle=":")
     axes.set(xlim=(0, 1.12), xlabel=f"share of {found.config.starts} starts")
     axes.invert_yaxis()
-    axes.set_title(found.verdict.removesuffix("."))
+    axes.set_title(titled(subject, found.verdict.removesuffix(".")))

@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
-from mjxgait.rendering.curves import DARK
+from mjxgait.rendering.curves import DARK, titled
 from mjxgait.rendering.floor import DARK_INK, Camera, font
-from mjxgait.rendering.gaitplots import gait_window
+from mjxgait.rendering.gaitplots import gait_window, subject_of
 from mjxgait.rendering.painter import paint
 from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.walk import Walk
@@ -25,31 +25,34 @@ def filmstrip(
     size: tuple[int, int] = SIZE,
     view: str | None = None,
     rows: int = 2,
+    clear: bool = False,
 ) -> Image.Image:
     """Return one stride in rows of pictures, each with its part of the stride and its time.
 
-    size: pixels of each picture. view: see `Stage`.
+    size: pixels of each picture. view, clear: see `Stage`; nothing is written on a clear one.
     """
     window, _ = gait_window(walk, 1)
     frames = np.round(np.linspace(window.start, window.stop, pictures, endpoint=False)).astype(int)
-    stage = Stage([walk], *size, view)
+    stage = Stage([walk], *size, view, clear)
     columns = -(-pictures // rows)
-    sheet = Image.new("RGB", (columns * (size[0] + 4) - 4, rows * (size[1] + 4) - 4), "white")
+    whole = columns * (size[0] + 4) - 4, rows * (size[1] + 4) - 4
+    sheet = Image.new("RGBA", whole) if clear else Image.new("RGB", whole, "white")
     for i, frame in enumerate(frames):
         picture = stage.picture(int(frame))
-        share = (frame - window.start) / (window.stop - window.start)
-        draw = ImageDraw.Draw(picture)
-        draw.text((10, 8), f"{share:.0%}", fill=DARK_INK, font=font(22))
-        draw.text(
-            (size[0] - 10, 10),
-            f"{frame * walk.time_step:.2f} s",
-            fill=DARK_INK,
-            font=font(16),
-            anchor="ra",
-        )
+        if not clear:
+            share = (frame - window.start) / (window.stop - window.start)
+            _write_moment(picture, share, frame * walk.time_step)
         row, column = divmod(i, columns)
         sheet.paste(picture, (column * (size[0] + 4), row * (size[1] + 4)))
     return sheet
+
+
+def _write_moment(picture: Image.Image, share: float, time: float) -> None:
+    """Write the part of the stride, and the time in s, at the upper edge."""
+    draw = ImageDraw.Draw(picture)
+    draw.text((10, 8), f"{share:.0%}", fill=DARK_INK, font=font(22))
+    place = (picture.width - 10, 10)
+    draw.text(place, f"{time:.2f} s", fill=DARK_INK, font=font(16), anchor="ra")
 
 
 def draw_filmstrip(drawing: Figure, walk: Walk) -> None:
@@ -58,10 +61,8 @@ def draw_filmstrip(drawing: Figure, walk: Walk) -> None:
     axes = drawing.subplots()
     axes.imshow(filmstrip(walk), interpolation="lanczos")
     axes.set_axis_off()
-    axes.set_title(
-        f"{walk.creature.name.replace('_', ' ')}: {what.replace('1 strides', 'one stride')}, in "
-        "parts of the stride"
-    )
+    what = f"{what.replace('1 strides', 'one stride')}, in parts of the stride"
+    axes.set_title(titled(subject_of(walk), what))
 
 
 SPACING = 0.45
@@ -96,14 +97,14 @@ def draw_strobe(drawing: Figure, walk: Walk, picture: Image.Image) -> None:
     axes = drawing.subplots()
     axes.imshow(picture, interpolation="lanczos")
     axes.set_axis_off()
-    name, seconds = walk.creature.title, frames[-1] * walk.time_step
-    axes.set_title(f"{name}: {len(frames)} moments of {seconds:.1f} s")
+    what = f"{len(frames)} moments of {frames[-1] * walk.time_step:.1f} s"
+    axes.set_title(titled(subject_of(walk), what))
 
 
 def strobe_shape(picture: Image.Image) -> tuple[float, float]:
     """Return the figure's size in inches."""
     width = min(14.0, 4.0 * picture.width / picture.height)
-    return width, width * picture.height / picture.width + 0.4
+    return width, width * picture.height / picture.width + 0.6
 
 
 def _camera(stage: Stage, walk: Walk, frames: np.ndarray) -> Camera:
@@ -164,7 +165,7 @@ def draw_front(drawing: Figure, kept: Sequence[Kept]) -> None:
         xlabel="key poses moved by, degrees (root mean square)",
         ylabel="disturbed starts that stay up",
         ylim=(-0.05, 1.08),
-        title="What the original costs: filled circles are certified",
+        title=f"{kept[0].walk.creature.title}: what the original costs; filled circles are certified",
     )
     above.yaxis.set_major_formatter("{x:.0%}")
     for axes, one in zip(strips, kept, strict=True):
@@ -173,4 +174,5 @@ def draw_front(drawing: Figure, kept: Sequence[Kept]) -> None:
         )
         axes.set_axis_off()
         verdict = "certified" if one.certified else "not certified"
-        axes.set_title(f"keep {one.keep:g}: {one.departs:.1f} degrees away, {verdict}")
+        said = f"keep {one.keep:g}: {one.departs:.1f} degrees away, {verdict}"
+        axes.set_title(f"{said}; {subject_of(one.walk)}")

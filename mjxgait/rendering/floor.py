@@ -2,11 +2,14 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 UP = np.array([0.0, 0.0, 1.0])
+SMOOTH = 2
+"""Drawn pixels per pixel and direction, so that edges are smooth."""
 VIEWS = {
     "side": (0.0, 8.0),
     "front": (75.0, 12.0),
@@ -42,7 +45,7 @@ class Camera:
     azimuth: float = np.radians(22.0)
     elevation: float = np.radians(16.0)
 
-    @property
+    @cached_property
     def axes(self) -> np.ndarray:
         """Unit rows [3, 3]: right in the picture, up in the picture, into the scene."""
         forward = np.append(self.forward, 0.0)
@@ -61,17 +64,28 @@ class Camera:
         """Return the depth [...] in m of world points [..., 3]."""
         return (points - self.centre) @ self.axes[2]
 
-    def rays(self, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Return world points [rows, columns, 3] in the picture's plane, at pixel middles."""
-        right, up, _ = self.axes
-        a = (columns + 0.5 - self.width / 2) / self.scale
-        b = -(rows + 0.5 - self.height / 2) / self.scale
-        return self.centre + a[None, :, None] * right + b[:, None, None] * up
+    def offsets(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return how far pixel middles lie to the right [columns] and up [rows] of the centre, m."""
+        return (
+            (columns + 0.5 - self.width / 2) / self.scale,
+            -(rows + 0.5 - self.height / 2) / self.scale,
+        )
 
     def enlarged(self, factor: int) -> "Camera":
         """Return the same view with more pixels."""
         return dataclasses.replace(
             self, scale=self.scale * factor, width=self.width * factor, height=self.height * factor
+        )
+
+    def cropped(self, box: tuple[int, int, int, int]) -> "Camera":
+        """Return the same view of a part of the picture. box: left, upper, right, lower pixel."""
+        left, upper, right, lower = box
+        aside = np.array([left + right - self.width, self.height - upper - lower]) / 2 / self.scale
+        return dataclasses.replace(
+            self,
+            centre=self.centre + aside @ self.axes[:2],
+            width=right - left,
+            height=lower - upper,
         )
 
 
@@ -97,14 +111,14 @@ def draw_relief(
 
     origin: [2] m, where bands are counted from, along the camera's forward.
     """
-    picture = Image.new("RGB", (camera.width, camera.height), colours[0])
+    picture = Image.new("RGB", (SMOOTH * camera.width, SMOOTH * camera.height), colours[0])
     draw = ImageDraw.Draw(picture)
     forward = camera.forward
     sideways = np.array([-forward[1], forward[0]])
     ahead, left = facet_lines(camera, origin, step, float(relief(*camera.centre[:2])))
     x, y = (origin[i] + ahead[None, :] * forward[i] + left[:, None] * sideways[i] for i in range(2))
     z = relief(x, y)
-    corners = camera.pixels(np.stack([x, y, z], -1))
+    corners = SMOOTH * camera.pixels(np.stack([x, y, z], -1))
     light = _brightness(z, ahead, left)
     dark = np.floor((ahead[:-1] + ahead[1:]) / 2 / step).astype(int) % 2
     shades = np.clip(light[..., None] * np.array(colours)[dark], 0, 255).astype(int)
@@ -112,7 +126,7 @@ def draw_relief(
         for i in range(len(ahead) - 1):
             quad = corners[[row, row, row + 1, row + 1], [i, i + 1, i + 1, i]]
             draw.polygon([tuple(p) for p in quad], fill=tuple(shades[row, i]))
-    return picture
+    return picture.reduce(SMOOTH)
 
 
 def facet_lines(
@@ -173,13 +187,15 @@ def draw_floor(
         number_bands(ImageDraw.Draw(picture), camera, origin, relief)
         return picture
     picture = Image.new("RGB", (camera.width, camera.height), bands[0])
-    draw = ImageDraw.Draw(picture)
+    dark = Image.new("L", (SMOOTH * camera.width, SMOOTH * camera.height))
+    draw = ImageDraw.Draw(dark)
     numbers, step = band_lines(camera, origin)
-    ends = _line_ends(camera, origin, numbers, step)
+    ends = SMOOTH * _line_ends(camera, origin, numbers, step)
     for i in np.flatnonzero(numbers[:-1] % 2):
         corners = [ends[i, 0], ends[i, 1], ends[i + 1, 1], ends[i + 1, 0]]
-        draw.polygon([tuple(p) for p in corners], fill=bands[1])
-    number_bands(draw, camera, origin)
+        draw.polygon([tuple(p) for p in corners], fill=255)
+    picture.paste(bands[1], mask=dark.reduce(SMOOTH))
+    number_bands(ImageDraw.Draw(picture), camera, origin)
     return picture
 
 

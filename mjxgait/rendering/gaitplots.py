@@ -5,8 +5,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from mjxgait.rendering.curves import ACCENT, DARK, MIDDLE, Figures
-from mjxgait.rendering.walk import Walk
+from mjxgait.rendering.curves import ACCENT, DARK, MIDDLE, Figures, titled
+from mjxgait.rendering.walk import WARMUP, Walk
 
 STRIDES = 2
 """Strides shown."""
@@ -14,6 +14,25 @@ FALLBACK = 2.0
 """Time shown of a walk without steady strides, s."""
 ROW = 0.28
 """Half the height of a footfall bar."""
+
+
+def subject_of(walk: Walk) -> str:
+    """Return creature, seed and mean speed of a walk, with which its titles begin."""
+    seed = walk.champion.origin.get("seed")
+    seeds = [] if seed is None else [f"seed {seed}"]
+    return ", ".join([walk.creature.title, *seeds, _outcome(walk)])
+
+
+def _outcome(walk: Walk) -> str:
+    """Mean straight-line speed from `WARMUP` on, or the time of a fall."""
+    if np.isfinite(walk.fell):
+        return f"fell at {walk.fell:.1f} s"
+    last = len(walk.trunk_pos) - 1
+    first = min(round(WARMUP / walk.time_step), last // 2)
+    moved = walk.trunk_pos[last] - walk.trunk_pos[first]
+    # In water there is no level way.
+    way = np.linalg.norm(moved) if walk.afloat else moved[:2] @ walk.forward
+    return f"{way / ((last - first) * walk.time_step):.2f} m/s"
 
 
 def gait_window(walk: Walk, strides: int = STRIDES) -> tuple[slice, str]:
@@ -56,7 +75,7 @@ def draw_footfalls(axes: Axes, walk: Walk) -> None:
         xlim=(0, len(contact) * step),
         ylim=(len(names) - 0.5, -0.5),
         xlabel="time (s)",
-        title=f"footfalls, with each foot's duty factor; {what}",
+        title=titled(subject_of(walk), f"footfalls, with each foot's duty factor; {what}"),
     )
     axes.set_yticks(range(len(names)), labels)
     axes.grid(False, axis="y")
@@ -66,11 +85,15 @@ def draw_footfalls(axes: Axes, walk: Walk) -> None:
 
 
 def draw_joints(drawing: Figure, walk: Walk) -> None:
-    """Draw angle and target of every joint, mirror partners in one row."""
+    """Draw angle and target of every joint, mirror partners in one row and on one scale."""
     window, what = gait_window(walk)
-    order = _partner_order(walk)
+    pairs, middle = _partners(walk)
+    order = [*pairs, *middle]
     columns = 2 if len(order) <= 20 else 4
     axes = drawing.subplots(-(-len(order) // columns), columns, sharex=True, squeeze=False)
+    for left, right in axes.reshape(-1, 2)[: len(pairs) // 2]:
+        right.sharey(left)
+        right.tick_params(labelleft=False)
     angles, targets = (
         np.degrees(walk.recording.joint_pos[window]),
         np.degrees(walk.trajectory.target[0][window]),
@@ -90,7 +113,8 @@ def draw_joints(drawing: Figure, walk: Walk) -> None:
     drawing.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
     drawing.supxlabel("time (s)", fontsize=10)
     drawing.supylabel("joint angle (°)", fontsize=10)
-    drawing.suptitle(f"joint angles and their targets; {what}", fontsize=11, x=0.01, ha="left")
+    title = titled(subject_of(walk), f"joint angles and their targets; {what}")
+    drawing.suptitle(title, fontsize=11, x=0.01, ha="left")
 
 
 def draw_trunk(drawing: Figure, walk: Walk) -> None:
@@ -100,7 +124,8 @@ def draw_trunk(drawing: Figure, walk: Walk) -> None:
     above, below = drawing.subplots(2, 1, sharex=True)
     above.plot(time, recording.trunk_pos[:, 2], "-", color=DARK, linewidth=1)
     above.axhline(walk.creature.frame.stand_height, color=MIDDLE, linestyle=":", label="standing")
-    above.set(ylabel="height (m)", title="trunk: height above the floor and forward speed")
+    title = titled(subject_of(walk), "trunk: height above the floor and forward speed")
+    above.set(ylabel="height (m)", title=title)
     above.set_ylim(
         0, max(1.35 * np.nanmax(recording.trunk_pos[:, 2]), 1.4 * walk.creature.frame.stand_height)
     )
@@ -130,14 +155,14 @@ def draw_trunk(drawing: Figure, walk: Walk) -> None:
 
 def gait_figures(walk: Walk) -> Figures:
     """Return the plots of this file by file name."""
-    rows = -(-len(_partner_order(walk)) // 2)
+    rows = -(-len(walk.creature.joints.names) // 2)
     return {
         "footfalls": (
-            (9, 0.9 + 0.42 * len(walk.creature.feet.names)),
+            (9, 1.1 + 0.42 * len(walk.creature.feet.names)),
             lambda drawing: draw_footfalls(drawing.subplots(), walk),
         ),
-        "joints": ((9, 1.0 + 1.15 * rows), lambda drawing: draw_joints(drawing, walk)),
-        "trunk": ((9, 4.5), lambda drawing: draw_trunk(drawing, walk)),
+        "joints": ((9, 1.2 + 1.15 * rows), lambda drawing: draw_joints(drawing, walk)),
+        "trunk": ((9, 4.7), lambda drawing: draw_trunk(drawing, walk)),
     }
 
 
@@ -154,12 +179,11 @@ def _mark_strides(axes: Axes, walk: Walk, window: slice) -> None:
             )
 
 
-def _partner_order(walk: Walk) -> list[int]:
-    """Joints in pairs of left and right, then those of the middle."""
+def _partners(walk: Walk) -> tuple[list[int], list[int]]:
+    """Joints in pairs of left and right, and those of the middle."""
     partner = walk.creature.mirror.partner
     pairs = [(j, int(p)) for j, p in enumerate(partner) if j < p]
-    paired = [j for pair in pairs for j in pair]
-    return paired + [j for j, p in enumerate(partner) if j == p]
+    return [j for pair in pairs for j in pair], [j for j, p in enumerate(partner) if j == p]
 
 
 def _plain(name: str) -> str:

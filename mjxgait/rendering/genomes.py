@@ -17,7 +17,7 @@ from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.reference_body import Part, grow
 from mjxgait.creature import Creature
 from mjxgait.inspect.snapshot import Snapshot, read_snapshot
-from mjxgait.rendering.curves import ACCENT, DARK, MIDDLE, PALE
+from mjxgait.rendering.curves import ACCENT, DARK, MIDDLE, PALE, titled
 from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.video import Runner, in_generations
 from mjxgait.rendering.walk import Walk
@@ -175,8 +175,8 @@ def bodies_of(run: Path, champion: Champion) -> Row:
     return Row(in_generations(run, shown, STANDING), descend)
 
 
-def draw_bodies(drawing: Figure, row: Row) -> None:
-    """Draw the bodies in a row, each at its own scale."""
+def draw_bodies(drawing: Figure, row: Row, subject: str = "") -> None:
+    """Draw the bodies in a row, each at its own scale. subject: see `titled`."""
     fields = drawing.subplots(1, len(row.bodies), squeeze=False)[0]
     for axes, body in zip(fields, row.bodies, strict=True):
         axes.imshow(Stage([body.walk], *SIZE).picture(0), interpolation="lanczos")
@@ -185,7 +185,7 @@ def draw_bodies(drawing: Figure, row: Row) -> None:
     said = "The champion and its ancestors, mother by mother"
     if not row.descend:
         said = "The best of each generation that was kept; one need not descend from the one before"
-    drawing.suptitle(said, fontsize=10)
+    drawing.suptitle(titled(subject, said), fontsize=10)
 
 
 def _place(population: Snapshot, champion: Champion) -> int:

@@ -1,4 +1,4 @@
-"""Pictures by MuJoCo's own renderer if GL works; a separate process tests that."""
+"""Pictures by MuJoCo's own renderer, on request, if GL works; a separate process tests that."""
 
 import subprocess
 import tempfile
@@ -25,15 +25,15 @@ PATIENCE = 60.0
 
 
 def working_backend(stage: Stage, wanted: str | None = None) -> tuple[str | None, str]:
-    """Return the GL backend that can draw this scene, or None; and a sentence on the attempts.
+    """Return the GL backend that can draw this scene, and words on it; or None, and the reason.
 
     Args:
       wanted: the value of MUJOCO_GL: the only backend to try, or one of `OFF`.
     """
     if wanted and wanted.lower() in OFF:
-        return None, f"drawn without GL, as MUJOCO_GL={wanted} says"
+        return None, f"MUJOCO_GL={wanted} forbids it"
     if not stage.alike:
-        return None, "drawn without GL, which draws several creatures of one kind only"
+        return None, "it draws several creatures of one kind only"
     reasons = []
     for backend in candidates(wanted):
         with tempfile.TemporaryDirectory() as folder:
@@ -57,7 +57,7 @@ def working_backend(stage: Stage, wanted: str | None = None) -> tuple[str | None
         reasons.append(
             f"{backend}: {lines[-1][:100] if lines else f'ended with code {done.returncode}'}"
         )
-    return None, f"drawn without GL, as it does not work here ({'; '.join(reasons)})"
+    return None, f"it does not work here ({'; '.join(reasons)})"
 
 
 def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[Image.Image]:
@@ -77,7 +77,7 @@ def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[I
                 raw = worker.stdout.read(3 * stage.width * stage.height)
                 if len(raw) < 3 * stage.width * stage.height:
                     raise UserError(
-                        f"the GL renderer ({backend}) stopped in the middle; add --renderer painter"
+                        f"the GL renderer ({backend}) stopped in the middle; leave --renderer out"
                     )
                 picture = Image.frombytes("RGB", (stage.width, stage.height), raw)
                 camera = stage.camera(frame)

@@ -5,22 +5,30 @@ Letters: `G` geoms.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
 from PIL import Image, ImageDraw, ImageFilter
 
 from mjxgait.rendering.floor import LIGHT as TOWARDS_LAMP
-from mjxgait.rendering.floor import Camera, Relief
-from mjxgait.rendering.shapes import Silhouettes, fill_mesh, hit
-from mjxgait.rendering.surroundings import PLAIN, Surroundings, backdrop, write_over
+from mjxgait.rendering.floor import SMOOTH, Camera, Relief
+from mjxgait.rendering.shapes import Silhouettes, distances, fill_mesh, normals
+from mjxgait.rendering.surroundings import (
+    PLAIN,
+    SHADE,
+    Surroundings,
+    backdrop,
+    write_over,
+)
 
-SMOOTH = 2
-"""Rays per pixel and direction."""
 LIGHT = TOWARDS_LAMP / np.linalg.norm(TOWARDS_LAMP)
 """Unit vector towards the lamp, as (forward, left, up) of the creature."""
 SHADOW_GREY = 0.30
+SHADOW_BLUR = 0.012
+"""Half the width of a shadow's edge in m."""
+Box = tuple[int, int, int, int]
+"""Left, upper, right and lower pixel of a part of a picture."""
 OUTLINE, SOFT_OUTLINE, CREASE = 0.45, 0.62, 0.82
 """Brightness of the lines between bodies, between soft ones, and between faces of a soft box."""
 HAZE = np.array([224, 226, 228], dtype=np.float32)
@@ -37,6 +45,7 @@ COMPASS = np.stack(
     ],
     1,
 )
+UNTURNED = np.eye(3)
 SEEN_GROUPS = 3
 """Number of visible geom groups: MuJoCo shows 0 to 2 by default."""
 
@@ -64,13 +73,16 @@ class Painter:
         directions = np.column_stack([COMPASS, np.zeros(len(COMPASS))])
         return self.outlines.outermost(pos[self.geoms], rot[self.geoms], directions)
 
+    def rims(self, camera: Camera, pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
+        """Return the pixels [geoms, 4, 2] between which each geom lies; see `shadows`."""
+        right, up, _ = camera.axes
+        sides = np.stack([right, up, -right, -up])
+        return camera.pixels(self.outlines.outermost(pos[self.geoms], rot[self.geoms], sides))
+
     def draw(self, canvas: "_Canvas", pos: np.ndarray, rot: np.ndarray, first: int = 0) -> None:
         """Draw onto a canvas, with bodies numbered from `first` on."""
+        rims = self.rims(canvas.camera, pos, rot)
         pos, rot = pos[self.geoms], rot[self.geoms]
-        right, up, _ = canvas.camera.axes
-        rims = canvas.camera.pixels(
-            self.outlines.outermost(pos, rot, np.stack([right, up, -right, -up]))
-        )
         for i, geom in enumerate(self.geoms):
             body = first + int(self.model.geom_bodyid[geom])
             paint = _Paint(self.colours[i], float(self.far[i]), body, self.soft)
@@ -96,35 +108,66 @@ def paint(
       origin: [2] m, where the scale on the floor is zero.
       relief: heights of uneven ground.
       around: the medium, and the light.
+
+    Returns:
+      RGB; RGBA if the surroundings are clear.
     """
-    fine = camera.enlarged(SMOOTH)
-    picture = backdrop(camera, origin, relief, around).resize(
-        (fine.width, fine.height), Image.Resampling.BICUBIC
-    )
+    picture = backdrop(camera, origin, relief, around)
     if not around.water:
-        rims = [painter.shadows(pos, rot) for painter, pos, rot in creatures]
-        _shade_floor(picture, fine, rims, relief)
-    canvas, first = _Canvas(np.asarray(picture, dtype=np.float32).copy(), fine), 0
-    for painter, pos, rot in creatures:
-        painter.draw(canvas, pos, rot, first)
-        first += painter.model.nbody
-    picture = canvas.image().reduce(SMOOTH)
+        shadows = [painter.shadows(pos, rot) for painter, pos, rot in creatures]
+        _shade_floor(picture, camera, shadows, relief)
+    rims = [painter.rims(camera, pos, rot).reshape(-1, 2) for painter, pos, rot in creatures]
+    # Nothing is computed where no body is: it is most of the picture.
+    if box := _box_of(rims, camera, 2):
+        bodies = _bodies(camera.cropped(box), creatures)
+        if around.clear:
+            picture.alpha_composite(bodies, box[:2])
+        else:
+            picture.paste(bodies, box, bodies)
     write_over(picture, camera, around)
     return picture
 
 
+def _bodies(
+    camera: Camera, creatures: Sequence[tuple[Painter, np.ndarray, np.ndarray]]
+) -> Image.Image:
+    """Return the creatures on a transparent picture; see `paint`."""
+    canvas, first = _Canvas(camera.enlarged(SMOOTH)), 0
+    for painter, pos, rot in creatures:
+        painter.draw(canvas, pos, rot, first)
+        first += painter.model.nbody
+    return canvas.image().reduce(SMOOTH)
+
+
+def _box_of(pixels: Sequence[np.ndarray], camera: Camera, margin: int) -> Box | None:
+    """Part of the picture around pixels, each [n, 2]; None if they lie outside."""
+    if not sum(map(len, pixels)):
+        return None
+    points = np.concatenate(pixels)
+    x0, y0 = np.maximum(np.floor(points.min(0)).astype(int) - margin, 0).tolist()
+    most = [camera.width, camera.height]
+    x1, y1 = np.minimum(np.ceil(points.max(0)).astype(int) + margin, most).tolist()
+    return (x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None
+
+
 def _shade_floor(
-    picture: Image.Image, camera: Camera, rims: Sequence[np.ndarray], relief: Relief | None
+    picture: Image.Image, camera: Camera, shadows: Sequence[np.ndarray], relief: Relief | None
 ) -> None:
     """Darken the floor below the creatures, where the light from above does not reach it."""
-    mask = Image.new("L", picture.size)
+    polygons = []
+    for points in shadows:
+        flat = 0.0 if relief is None else relief(points[..., 0], points[..., 1])
+        level = np.broadcast_to(flat, points.shape[:-1])
+        polygons += list(camera.pixels(np.concatenate([points[..., :2], level[..., None]], -1)))
+    blur = max(camera.scale * SHADOW_BLUR, 0.5)
+    box = _box_of(polygons, camera, int(blur) + 2)
+    if box is None:
+        return
+    mask = Image.new("L", (box[2] - box[0], box[3] - box[1]))
     draw = ImageDraw.Draw(mask)
-    for points in rims:
-        points[..., 2] = 0.0 if relief is None else relief(points[..., 0], points[..., 1])
-        for polygon in camera.pixels(points):
-            draw.polygon([tuple(p) for p in polygon], fill=round(255 * SHADOW_GREY))
-    mask = mask.filter(ImageFilter.BoxBlur(max(camera.scale * 0.012, 1)))
-    picture.paste((40, 44, 52), mask=mask)
+    for polygon in polygons:
+        draw.polygon([tuple(p) for p in polygon - box[:2]], fill=round(255 * SHADOW_GREY))
+    picture.paste(SHADE, box, mask.filter(ImageFilter.BoxBlur(blur)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -138,13 +181,14 @@ class _Paint:
 
 
 class _Canvas:
-    """A picture [height, width, 3] with a depth buffer."""
+    """A transparent picture [height, width] with a depth buffer."""
 
-    def __init__(self, pixels: np.ndarray, camera: Camera) -> None:
-        self.pixels, self.camera = pixels, camera
-        self.depth = np.full(pixels.shape[:2], np.inf)
-        self.body = np.full(pixels.shape[:2], -1, dtype=np.int32)
-        self.face = np.zeros(pixels.shape[:2], dtype=np.int8)
+    def __init__(self, camera: Camera) -> None:
+        self.camera, shape = camera, (camera.height, camera.width)
+        self.pixels = np.zeros((*shape, 3), dtype=np.float32)
+        self.depth = np.full(shape, np.inf, dtype=np.float32)
+        self.body = np.full(shape, -1, dtype=np.int32)
+        self.face = np.zeros(shape, dtype=np.int8)
         """Number of a soft body's face from 1; 0 elsewhere."""
         self.light = lamp_direction(camera.forward)
 
@@ -164,55 +208,75 @@ class _Canvas:
         )
         if x0 >= x1 or y0 >= y1:
             return
-        rays = self.camera.rays(np.arange(x0, x1), np.arange(y0, y1)).reshape(-1, 3)
-        distance, normal = hit(kind, size, (rays - pos) @ rot, self.camera.axes[2] @ rot)
-        shape = (y1 - y0, x1 - x0)
+        into, size = self.camera.axes[2], size.astype(np.float32)
+        # Rays begin at the geom's depth and in its frame, so single precision will do.
+        depth = into @ (pos - self.camera.centre)
+        start = (self.camera.centre + depth * into - pos) @ rot
+        right, up, way = (self.camera.axes @ rot).astype(np.float32)
+        a, b = self.camera.offsets(np.arange(x0, x1), np.arange(y0, y1))
+        grid = np.empty((3, len(b), len(a)), dtype=np.float32)
+        for i in range(3):
+            np.add(start[i] + a * right[i], (b * up[i])[:, None], out=grid[i], casting="same_kind")
+        rays = grid.reshape(3, -1)
+        distance = distances(kind, size, rays.T, way)
+
+        def normal(covered: np.ndarray) -> np.ndarray:
+            points = rays[:, covered].T + distance[covered, None] * way
+            return normals(kind, size, points, way)
+
+        place = slice(y0, y1), slice(x0, x1)
         flat = paint.soft and kind == mujoco.mjtGeom.mjGEOM_BOX
-        self.cover(
-            (slice(y0, y1), slice(x0, x1)),
-            distance.reshape(shape),
-            (normal @ rot.T).reshape(*shape, 3),
-            paint,
-            # A camera sees at most one of two opposite faces.
-            1 + np.abs(normal).argmax(1).reshape(shape) if flat else None,
-        )
+        self.cover(place, (distance + depth).reshape(len(b), -1), normal, paint, rot, flat)
 
     def cover(
         self,
         place: tuple[slice, slice],
         distance: np.ndarray,
-        normal: np.ndarray,
+        normal: Callable[[np.ndarray], np.ndarray],
         paint: _Paint,
-        face: np.ndarray | None = None,
+        rot: np.ndarray = UNTURNED,
+        flat: bool = False,
     ) -> None:
         """Paint a rectangle's pixels that are nearer than the present ones.
 
-        distance: [h, w] m; normal: [h, w, 3] in the world. face: [h, w] numbers of faces, for lines.
+        Args:
+          distance: [h, w] m.
+          normal: returns the normals [n or 1, 3] of pixels [n], in a frame that rot [3, 3] turns
+            into the world.
+          flat: whether it has three faces with lines between them.
         """
         nearer = distance < self.depth[place]
-        self.depth[place][nearer] = distance[nearer]
-        self.body[place][nearer] = paint.body
+        covered = np.flatnonzero(nearer)
+        if not len(covered):
+            return
+        own = normal(covered)
+        np.copyto(self.depth[place], distance, where=nearer)
+        np.copyto(self.body[place], paint.body, where=nearer)
         if paint.soft:
-            self.face[place][nearer] = SMOOTH_FACE if face is None else face[nearer]
-        n = normal[nearer]
+            # A camera sees at most one of two opposite faces.
+            self.face[place][nearer] = 1 + np.abs(own).argmax(1) if flat else SMOOTH_FACE
         # A lamp, the sky above and a little light from the floor.
         shade, sun = SOFT_LIGHT if paint.soft else HARD_LIGHT
-        bright = shade + sun * np.maximum(n @ self.light, 0) + 0.20 * (0.5 + 0.5 * n[:, 2])
-        colour = 255 * np.clip(bright[:, None] * (0.06 + 0.94 * paint.colour), 0, 1)
+        lamp, up = (rot.T @ self.light).astype(np.float32), rot[2].astype(np.float32)
+        bright = shade + sun * np.maximum(own @ lamp, 0) + 0.20 * (0.5 + 0.5 * (own @ up))
+        full = (255 * (0.06 + 0.94 * paint.colour)).astype(np.float32)
+        colour = np.minimum(bright[:, None] * full, 255)
         self.pixels[place][nearer] = colour + MOST_HAZE * paint.far * (HAZE - colour)
 
     def image(self) -> Image.Image:
         """Return the picture, with dark lines between bodies and, softer, between faces."""
-        between = _edges(self.body)
-        soft = _edges(self.face > 0) | (self.face > 0)
-        crease = _edges(self.face) & ~between
-        for edge, light in (
-            (between & ~soft, OUTLINE),
-            (between & soft, SOFT_OUTLINE),
-            (crease, CREASE),
-        ):
+        between, outside = _edges(self.body), self.body < 0
+        lines = [(between, OUTLINE)]
+        if self.face.any():
+            soft = _edges(self.face > 0) | (self.face > 0)
+            crease = _edges(self.face) & ~between
+            lines = [(between & ~soft, OUTLINE), (between & soft, SOFT_OUTLINE), (crease, CREASE)]
+        alpha = np.where(outside, np.uint8(0), np.uint8(255))
+        for edge, light in lines:
             self.pixels[edge] *= light
-        return Image.fromarray(self.pixels.astype(np.uint8))
+            # Half of an outline lies beside its body and darkens what is behind.
+            alpha[edge & outside] = round(255 * (1 - light))
+        return Image.fromarray(np.dstack([self.pixels.astype(np.uint8), alpha]))
 
 
 def _edges(numbers: np.ndarray) -> np.ndarray:

@@ -142,8 +142,6 @@ LAG = 0.15
 """Distance of a race's leader from the middle, as a share of the picture's width."""
 SMOOTH_SECONDS = 0.6
 """Averaging window of the camera's path, so that it does not shake with each step."""
-
-
 MARGINS = np.array([0.03, 0.03, 0.06, 0.10])
 """Least distance of a body from the picture's edges (right, left, upper, lower), as a share of the
 picture; captions stand above, numbers below.
@@ -156,12 +154,18 @@ class Stage:
     """A scene: walks in lanes side by side, the first one nearest, seen from the side.
 
     Frames are control steps of the first walk. view: a name in `floor.VIEWS`; by default slightly
-    from the front and from above.
+    from the front and from above. clear: see `Surroundings`.
     """
 
     def __init__(
-        self, walks: Sequence[Walk], width: int, height: int, view: str | None = None
+        self,
+        walks: Sequence[Walk],
+        width: int,
+        height: int,
+        view: str | None = None,
+        clear: bool = False,
     ) -> None:
+        self.clear = clear
         self.width, self.height, self.time_step = width, height, walks[0].time_step
         self.origin, self.forward = walks[0].trunk_pos[0, :2], walks[0].forward
         self.left = np.array([-self.forward[1], self.forward[0], 0.0])
@@ -222,7 +226,7 @@ class Stage:
         lights = [one.light + lane for one, lane in places if one.light is not None]
         water = all(walk.afloat for walk in walks)
         sand = not water and all(walk.grown for walk in walks)
-        return Surroundings(water, sand, lights[0] if lights else None)
+        return Surroundings(water, sand, lights[0] if lights else None, self.clear)
 
     @property
     def relief(self) -> Relief | None:
@@ -253,10 +257,8 @@ class Stage:
     def _choose_view(self) -> None:
         """Set scale, height and path of the camera such that all lanes fill the picture."""
         flat = Camera(np.append(self.origin, 0.0), self.forward, 1.0, 0, 0, **self.view)
-        outlines = [
-            one.outline + lane for one, lane in zip(self.participants, self.lanes, strict=True)
-        ]
-        seen = flat.pixels(np.concatenate(outlines))
+        pairs = zip(self.participants, self.lanes, strict=True)
+        seen = flat.pixels(np.concatenate([one.outline + lane for one, lane in pairs]))
         size = np.ptp(seen, axis=0)
         self.scale = float(min(self.width / (ROOM * size[0]), self.height / (ROOM * size[1])))
         self.shift = float(seen[:, 0].max() + seen[:, 0].min()) / 2 * flat.axes[0]

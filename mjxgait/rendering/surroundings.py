@@ -21,6 +21,8 @@ from mjxgait.rendering.floor import (
 
 SAND = ((233, 218, 186), (230, 214, 181))
 """Colours of the bands on land for bodies that grew: nearly plain, so that a motion still shows."""
+SHADE = (40, 44, 52)
+"""Colour of a shadow."""
 SURFACE, DEEP = np.array([204, 232, 242.0]), np.array([84, 148, 190.0])
 """Colours of water at the picture's upper and lower edge."""
 SPECK, SPECK_PIXELS = np.array([244, 250, 252.0]), 0.005
@@ -40,12 +42,13 @@ BAR = 0.22
 @dataclasses.dataclass(frozen=True, eq=False)
 class Surroundings:
     """Surroundings of a scene. water: no floor. sand: instead of a grey floor. light: its place
-    [3] m.
+    [3] m. clear: nothing is shown but the bodies and their shadow, on a transparent background.
     """
 
     water: bool = False
     sand: bool = False
     light: np.ndarray | None = None
+    clear: bool = False
 
     @property
     def bands(self) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
@@ -60,7 +63,9 @@ PLAIN = Surroundings()
 def backdrop(
     camera: Camera, origin: np.ndarray, relief: Relief | None, around: Surroundings
 ) -> Image.Image:
-    """Return the picture without bodies; see `draw_floor`."""
+    """Return the picture without bodies; see `draw_floor`. RGBA if it is clear."""
+    if around.clear:
+        return Image.new("RGBA", (camera.width, camera.height), (*SHADE, 0))
     return tank(camera) if around.water else draw_floor(camera, origin, relief, around.bands)
 
 
@@ -79,6 +84,8 @@ def write_marks(
 
 def write_over(picture: Image.Image, camera: Camera, around: Surroundings) -> None:
     """Draw what lies over the bodies: in water a scale, and the light."""
+    if around.clear:
+        return
     if around.light is not None:
         _draw_light(picture, camera, around.light)
     if around.water:

@@ -1,8 +1,9 @@
-"""Videos of one champion, or several walks as a race, as WebP, GIF or MP4."""
+"""Videos of one champion, or several walks as a race, as WebP, GIF, MP4, MOV or WebM."""
 
 import dataclasses
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
 
@@ -18,15 +19,47 @@ from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.walk import Walk, record_walk
 from mjxgait.training.folder import open_champion, require_output
 
-VIDEOS = (".webp", ".gif", ".mp4")
+
+@dataclasses.dataclass(frozen=True)
+class Coding:
+    """How PyAV writes a kind of file. opaque, clear: pixel formats without and with alpha; an empty
+    one if it has no alpha.
+    """
+
+    codec: str
+    opaque: str
+    clear: str
+    options: Mapping[str, str]
+
+
+CODINGS = {
+    ".mp4": Coding("libx264", "yuv420p", "", {"crf": "20"}),
+    # ProRes 4444, which editors read; VP9 with alpha, which browsers play.
+    ".mov": Coding("prores_ks", "yuv444p10le", "yuva444p10le", {"profile": "4444"}),
+    ".webm": Coding(
+        "libvpx-vp9",
+        "yuv420p",
+        "yuva420p",
+        {"crf": "28", "b": "0", "cpu-used": "4", "row-mt": "1"},
+    ),
+}
+VIDEOS = (".webp", ".gif", *CODINGS)
 STILL = ".png"
 PAPER = (255, 255, 255, 200)
 LABEL_GAP = 8
 """Pixels between a creature and its label."""
 EDGE = 8
 """Pixels between a label and the picture's edge."""
-GIF_HUNDREDTHS = 100
-"""Time units per second in a GIF."""
+WEBP_UNIT, GIF_UNIT = 1, 10
+"""Units in which a frame's duration is stored, ms."""
+GIF_FASTEST = 50
+"""Frames per second; programs show a GIF's frames of 10 ms for 100 ms."""
+NTSC = 0.005
+"""Largest distance of a given frame rate from one of NTSC, such as 23.98 from 24000/1001."""
+GIF_COLOURS = 128
+"""Colours of a GIF; in a transparent one the last stands for none."""
+OPAQUE = 128
+"""Least alpha of a pixel that a GIF shows: it has whole pixels only."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -38,9 +71,13 @@ class Runner:
 
 
 def moving_pictures(
-    runners: Sequence[Runner], stage: Stage, fps: int, slow: float = 1.0, backend: str | None = None
+    runners: Sequence[Runner],
+    stage: Stage,
+    fps: float,
+    slow: float = 1.0,
+    backend: str | None = None,
 ) -> Iterator[Image.Image]:
-    """Draw the frames of a video.
+    """Draw the frames of a video; nothing is written on a transparent background.
 
     slow: factor by which time is stretched. backend: of GL; None draws without.
     """
@@ -49,7 +86,8 @@ def moving_pictures(
     frames = [min(round(i / fps / slow / step), stage.frames - 1) for i in range(count)]
     pictures = gl_pictures(stage, frames, backend) if backend else stage.pictures(frames)
     for frame, picture in zip(frames, pictures, strict=True):
-        write_captions(picture, stage, runners, frame, slow)
+        if not stage.around.clear:
+            write_captions(picture, stage, runners, frame, slow)
         yield picture
 
 
@@ -96,77 +134,115 @@ def condition(walk: Walk, time: float) -> str:
     return f"{way / ((frame - before) * walk.time_step):.2f} m/s"
 
 
-def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
-    """Write the frames in the format given by the file's suffix.
+def write_video(pictures: Iterable[Image.Image], path: Path, fps: float) -> None:
+    """Write the frames, RGB or RGBA, in the format given by the file's suffix.
 
     Raises:
-      UserError: another format, MP4 without the extra, or a file that cannot be written.
+      UserError: another format, one without its extra, or a file that cannot be written.
     """
     require_ending(path, VIDEOS)
-    writers = {".mp4": _write_mp4, ".webp": _write_webp, ".gif": _write_gif}
-    write = writers[path.suffix.lower()]
+    kind = path.suffix.lower()
+    write = {".webp": _write_webp, ".gif": _write_gif}.get(kind, _write_coded)
     with writing(path), replaced(path) as beside:
         write(pictures, beside, fps)
 
 
-def require_writer(path: Path, stills: bool = False) -> None:
+def require_writer(path: Path, stills: bool = False, fps: float = 1.0, clear: bool = False) -> None:
     """Check before the long work that the file can be written.
 
-    stills: whether a picture will do as well as a video.
+    stills: whether a picture will do as well as a video. clear: whether it needs transparency.
 
     Raises:
-      UserError: see `write_video`.
+      UserError: see `write_video`; or the format cannot hold the frame rate or transparency.
     """
     require_ending(path, (*VIDEOS, STILL) if stills else VIDEOS)
-    if path.suffix.lower() == ".mp4":
+    kind = path.suffix.lower()
+    if kind == ".gif" and fps > GIF_FASTEST:
+        raise UserError(
+            f"{path}: a GIF holds at most {GIF_FASTEST} frames per second; lower --fps, or write "
+            ".webp or .mp4"
+        )
+    if clear and kind in CODINGS and not CODINGS[kind].clear:
+        raise UserError(
+            f"{path}: {kind[1:].upper()} holds no transparency; end the name with .webp, .mov, "
+            ".webm, .gif or .png, or leave --background out"
+        )
+    if kind in CODINGS:
         _import_av(path)
     require_output(path)
 
 
-def _write_webp(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
+def frame_rate(fps: float) -> Fraction:
+    """Return the exact frame rate: 23.976, 29.97 and the like are those of NTSC, n / 1.001."""
+    whole = round(1.001 * fps)
+    if fps != round(fps) and abs(fps - whole / 1.001) < NTSC:
+        return Fraction(1000 * whole, 1001)
+    return Fraction(fps).limit_denominator(1000)
+
+
+def durations(count: int, fps: float, unit: int) -> list[int]:
+    """Return the durations [count] of frames in ms, whole units that add up to the right length."""
+    ends = np.round(np.arange(count + 1) * (1000 / unit / float(frame_rate(fps))))
+    return [int(duration) for duration in unit * np.diff(ends)]
+
+
+def _write_webp(pictures: Iterable[Image.Image], path: Path, fps: float) -> None:
     first, *others = pictures
     first.save(
         path,
         save_all=True,
         append_images=others,
-        duration=round(1000 / fps),
+        duration=durations(1 + len(others), fps, WEBP_UNIT),
         loop=0,
         quality=75,
         method=3,
     )
 
 
-def _write_gif(given: Iterable[Image.Image], path: Path, fps: int) -> None:
+def _write_gif(given: Iterable[Image.Image], path: Path, fps: float) -> None:
     pictures = list(given)
+    clear = pictures[0].mode == "RGBA"
     # One palette for all frames, so that still parts do not flicker.
-    samples = pictures[:: max(len(pictures) // 6, 1)]
+    samples = [sample.convert("RGB") for sample in pictures[:: max(len(pictures) // 6, 1)]]
     joined = Image.fromarray(np.concatenate([np.asarray(sample) for sample in samples]))
-    palette = joined.quantize(128, method=Image.Quantize.MEDIANCUT)
-    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    duration = 10 * max(round(GIF_HUNDREDTHS / fps), 2)
+    colours = joined.quantize(GIF_COLOURS - clear, method=Image.Quantize.MEDIANCUT)
+    frames = []
+    for picture in pictures:
+        frame = picture.convert("RGB").quantize(palette=colours, dither=Image.Dither.NONE)
+        if clear:
+            frame.paste(GIF_COLOURS - 1, mask=picture.getchannel("A").point(_hidden))
+            frame.info["transparency"] = GIF_COLOURS - 1
+        frames.append(frame)
     frames[0].save(
-        path, save_all=True, append_images=frames[1:], duration=duration, loop=0, optimize=False
+        path,
+        save_all=True,
+        append_images=frames[1:],
+        duration=durations(len(frames), fps, GIF_UNIT),
+        loop=0,
+        optimize=False,
+        # Else clear pixels would show the frame before.
+        disposal=2 if clear else 0,
     )
 
 
-def _write_mp4(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
-    av = _import_av(path)
+def _hidden(alpha: int) -> int:
+    return 0 if alpha >= OPAQUE else 255
+
+
+def _write_coded(pictures: Iterable[Image.Image], path: Path, fps: float) -> None:
+    av, coding = _import_av(path), CODINGS[path.suffix.lower()]
     frames = iter(pictures)
     first = next(frames)
-    # H.264 requires even sizes.
+    # Half the colours of a line or a column cannot be stored.
     width, height = first.width // 2 * 2, first.height // 2 * 2
+    form = "rgba" if first.mode == "RGBA" else "rgb24"
     with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=fps)
-        stream.width, stream.height, stream.pix_fmt, stream.options = (
-            width,
-            height,
-            "yuv420p",
-            {"crf": "20"},
-        )
+        stream = container.add_stream(coding.codec, rate=frame_rate(fps))
+        stream.width, stream.height, stream.options = width, height, dict(coding.options)
+        stream.pix_fmt = coding.clear if first.mode == "RGBA" else coding.opaque
         for picture in itertools.chain([first], frames):
-            container.mux(
-                stream.encode(av.VideoFrame.from_image(picture.crop((0, 0, width, height))))
-            )
+            pixels = np.ascontiguousarray(np.asarray(picture)[:height, :width])
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format=form)))
         container.mux(stream.encode())
 
 
@@ -175,7 +251,8 @@ def _import_av(path: Path) -> ModuleType:
         import av
     except ImportError:
         raise UserError(
-            f"{path}: MP4 needs an extra: {install_command('video')}; WebP and GIF need none"
+            f"{path}: {path.suffix[1:].upper()} needs an extra: {install_command('video')}; WebP and "
+            "GIF need none"
         ) from None
     return av
 

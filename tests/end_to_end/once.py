@@ -36,13 +36,13 @@ def predicted_once(creature: Creature) -> Feasibility:
     return PREDICTIONS.find(creature.digest, lambda: feasibility(creature))
 
 
-def curve_drawn_once(lines: Lines, path: Path) -> None:
+def curve_drawn_once(lines: Lines, path: Path, subject: str) -> None:
     """Stand in for `plot_fitness`: equal curves are one drawing."""
     column = columns(lines)
     shown = np.array([column[name] for name in DRAWN])
 
     def draw() -> bytes:
-        plot_fitness(lines, path)
+        plot_fitness(lines, path, subject)
         return path.read_bytes()
 
-    path.write_bytes(CURVES.find(shown.tobytes(), draw))
+    path.write_bytes(CURVES.find(subject.encode() + shown.tobytes(), draw))

@@ -85,7 +85,10 @@ FORMS: dict[str, list[Made]] = {
     "inspect": [of_run(writes=""), of_run("--all", "--json", writes="")],
     "plot": [of_run("--formats", "png", writes="run/plots/filmstrip.png")],
     "render": [
-        of_run("--renderer", "painter", "--seconds", "0.4", "--out", f"walk.{kind}", writes="")
+        of_run(
+            *("--seconds", "0.4", "--size", "320", "180", "--out", f"walk.{kind}"),
+            writes=f"walk.{kind}",
+        )
         for kind in ("png", "webp")
     ],
     "export": [of_run("--out", f"walk.{kind}", writes=f"walk.{kind}") for kind in ("glb", "bvh")],

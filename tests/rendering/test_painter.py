@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from rendering.made_up import treading
 
+from mjxgait.rendering import painter
 from mjxgait.rendering.floor import Camera, band_width
 from mjxgait.rendering.painter import (
     Painter,
@@ -12,8 +13,9 @@ from mjxgait.rendering.painter import (
     paint,
     seen_geoms,
 )
-from mjxgait.rendering.shapes import Silhouettes, hit
+from mjxgait.rendering.shapes import Silhouettes, distances, normals
 from mjxgait.rendering.stage import Stage
+from mjxgait.rendering.surroundings import Surroundings
 from mjxgait.rendering.walk import record_walk
 
 FORWARD = np.array([1.0, 0.0])
@@ -39,6 +41,14 @@ def view(scale=200.0):
     return Camera(np.array([0.0, 0.0, 1.0]), FORWARD, scale, 320, 240)
 
 
+def rays_of(camera):
+    """World points [height, width, 3] m in the picture's plane, at pixel middles."""
+    right, up, _ = camera.axes
+    a = (np.arange(camera.width) + 0.5 - camera.width / 2) / camera.scale
+    b = (camera.height / 2 - np.arange(camera.height) - 0.5) / camera.scale
+    return camera.centre + a[None, :, None] * right + b[:, None, None] * up
+
+
 def painted(model):
     """Mask [240, 320] of the red shape, and its data."""
     data = mujoco.MjData(model)
@@ -60,7 +70,7 @@ def test_rays_hit_where_mujoco_says(kind):
     direction = rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     origins = rng.uniform(-0.35, 0.35, (400, 3)) - 2 * direction
-    distance, normal = hit(int(geom), size, origins, direction)
+    distance = distances(int(geom), size, origins, direction)
     here = np.eye(3).ravel()
     expected = [
         mujoco.mju_rayGeom(np.zeros(3), here, size, o, direction, int(geom), None) for o in origins
@@ -68,14 +78,21 @@ def test_rays_hit_where_mujoco_says(kind):
     expected = np.where(np.array(expected) < 0, np.inf, expected)
     assert np.isfinite(expected).sum() > 30
     np.testing.assert_allclose(distance, expected, atol=1e-6)
-    assert (normal[np.isfinite(distance)] @ direction < 1e-9).all()
+    met = np.isfinite(distance)
+    points = origins[met] + distance[met, None] * direction
+    outward = normals(int(geom), size, points, direction)
+    np.testing.assert_allclose(np.linalg.norm(outward, axis=1), 1, atol=1e-6)
+    assert (outward @ direction < 1e-6).all()
+    # A step along the normal leaves the shape.
+    beyond = distances(int(geom), size, points + 1e-4 * outward - 2 * direction, direction)
+    assert (beyond > 2 - 1e-9).all()
 
 
 @pytest.mark.parametrize("kind", [*SHAPES, "mesh"])
 def test_every_shape_is_painted_where_it_is(kind):
     model = one_shape(kind, SHAPES.get(kind, ("",))[0], MESH if kind == "mesh" else "")
     mask, data = painted(model)
-    rays = view().rays(np.arange(320), np.arange(240)).reshape(-1, 3)
+    rays = rays_of(view()).reshape(-1, 3)
     into = view().axes[2]
     ids = np.zeros(1, np.int32)
     seen = [
@@ -84,6 +101,21 @@ def test_every_shape_is_painted_where_it_is(kind):
     ]
     assert sum(seen) > 100
     assert (mask.ravel()[::7] == np.array(seen)).mean() > 0.985
+
+
+def test_half_of_an_outline_darkens_what_is_behind(monkeypatch):
+    """Else a body has no line on its left and upper side, as it has on the others."""
+    monkeypatch.setattr(painter, "SMOOTH", 1)
+    model = one_shape("box", "0.1 0.2 0.3")
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    pose = (Painter(model), data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))
+    alone = Surroundings(water=True, clear=True)
+    alpha = np.asarray(paint(view(), [pose], np.zeros(2), around=alone))[..., 3]
+    line = round(255 * (1 - painter.OUTLINE))
+    assert set(np.unique(alpha)) == {0, line, 255}
+    across = alpha[120][alpha[120] > 0]
+    assert (across[0], across[-1]) == (line, 255)
 
 
 def test_nearer_shapes_hide_those_behind():
@@ -95,11 +127,11 @@ def test_nearer_shapes_hide_those_behind():
     mujoco.mj_kinematics(model, data)
     camera = Camera(np.array([0.0, 0.0, 1.0]), FORWARD, 100, 200, 200, azimuth=0.0, elevation=0.1)
     for order in ([0, 1], [1, 0]):
-        painter = Painter(model)
-        painter.geoms, painter.colours = painter.geoms[order], painter.colours[order]
-        painter.outlines = Silhouettes(model, painter.geoms)
+        one = Painter(model)
+        one.geoms, one.colours = one.geoms[order], one.colours[order]
+        one.outlines = Silhouettes(model, one.geoms)
         picture = paint(
-            camera, [(painter, data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2)
+            camera, [(one, data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2)
         )
         red, _, blue = picture.getpixel((100, 95))
         assert red > blue
@@ -158,7 +190,7 @@ def test_boxes_that_cross_are_split_where_they_meet():
     camera = view(400.0)
     poses = data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3)
     colours = np.asarray(paint(camera, [(Painter(model), *poses)], np.zeros(2))).astype(int)
-    rays, into = camera.rays(np.arange(320), np.arange(240)), camera.axes[2]
+    rays, into = rays_of(camera), camera.axes[2]
     met = np.full((240, 320), -1)
     ids = np.zeros(1, np.int32)
     for place in np.ndindex(240, 320):

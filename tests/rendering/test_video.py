@@ -1,6 +1,7 @@
-"""`mjxgait render`: videos in common formats."""
+"""`mjxgait render`: videos in common formats, at any frame rate."""
 
 import sys
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,7 +14,14 @@ from mjxgait.creature import load_creature
 from mjxgait.extras import install_command
 from mjxgait.rendering.floor import VIEWS
 from mjxgait.rendering.stage import Stage, smooth
-from mjxgait.rendering.video import Runner, condition, moving_pictures
+from mjxgait.rendering.video import (
+    Runner,
+    condition,
+    durations,
+    frame_rate,
+    moving_pictures,
+    write_video,
+)
 from mjxgait.rendering.walk import record_walk
 
 SMALL = ("--seconds", "0.8", "--fps", "10", "--size", "160", "96", "--renderer", "painter")
@@ -40,17 +48,85 @@ def test_a_video_has_its_frames_and_moves(stool_run, tmp_path, capsys, kind):
     assert Image.open(out).info["loop"] == 0
 
 
-def test_mp4_with_the_extra(stool_run, tmp_path, capsys):
+@pytest.mark.parametrize("kind", ["mp4", "mov", "webm"])
+def test_videos_with_the_extra(stool_run, tmp_path, capsys, kind):
     av = pytest.importorskip("av", reason="the extra [video] is not installed")
-    out = tmp_path / "walk.mp4"
+    out = tmp_path / f"walk.{kind}"
     assert render(capsys, stool_run, "--out", out, *SMALL)[0] == 0
     with av.open(str(out)) as container:
         assert sum(1 for _ in container.decode(video=0)) == 8
 
 
+def test_a_video_has_a_size_of_1280_by_720_by_default(stool_run, tmp_path, capsys):
+    out = tmp_path / "walk.webp"
+    assert render(capsys, stool_run, "--out", out, "--seconds", "0.1", "--fps", "10")[0] == 0
+    assert Image.open(out).size == (1280, 720)
+
+
+@pytest.mark.parametrize(
+    ("given", "exact"),
+    [
+        (25, Fraction(25)),
+        (120, Fraction(120)),
+        (12.5, Fraction(25, 2)),
+        (23.976, Fraction(24000, 1001)),
+        (23.98, Fraction(24000, 1001)),
+        (29.97, Fraction(30000, 1001)),
+        (59.94, Fraction(60000, 1001)),
+    ],
+)
+def test_a_frame_rate_is_exact(given, exact):
+    assert frame_rate(given) == exact
+
+
+@pytest.mark.parametrize("fps", [23.976, 29.97, 60, 120])
+@pytest.mark.parametrize("unit", [1, 10])
+def test_durations_add_up_to_the_right_time(fps, unit):
+    """No frame is late by more than half a unit."""
+    each = np.array(durations(200, fps, unit))
+    assert (each % unit == 0).all()
+    late = np.cumsum(each) - 1000 * np.arange(1, 201) / float(frame_rate(fps))
+    assert np.abs(late).max() <= unit / 2 + 1e-9
+
+
+def moving_bar(count):
+    """Pictures that differ: formats may store equal ones once."""
+    picture = np.zeros((64, 64, 3), np.uint8)
+    picture[:, :8] = 255
+    return (Image.fromarray(np.roll(picture, 7 * i, axis=1)) for i in range(count))
+
+
+def stored(path):
+    """Duration of each frame of an animated picture in ms."""
+    with Image.open(path) as picture:
+        given = []
+        for i in range(picture.n_frames):
+            picture.seek(i)
+            picture.load()
+            given.append(picture.info["duration"])
+    return given
+
+
+@pytest.mark.parametrize(("kind", "fps", "each"), [("webp", 120, {8, 9}), ("gif", 29.97, {30, 40})])
+def test_pictures_that_move_keep_the_time(tmp_path, kind, fps, each):
+    write_video(moving_bar(60), tmp_path / f"walk.{kind}", fps)
+    found = stored(tmp_path / f"walk.{kind}")
+    assert (len(found), set(found)) == (60, each)
+    assert sum(found) == pytest.approx(60_000 / fps, abs=5)
+
+
+@pytest.mark.parametrize("kind", ["mp4", "mov", "webm"])
+def test_a_video_stores_the_exact_rate(tmp_path, kind):
+    av = pytest.importorskip("av", reason="the extra [video] is not installed")
+    write_video(moving_bar(30), tmp_path / f"walk.{kind}", 29.97)
+    with av.open(str(tmp_path / f"walk.{kind}")) as container:
+        assert container.streams.video[0].average_rate == Fraction(30000, 1001)
+        assert container.duration / 1e6 == pytest.approx(30 * 1.001 / 30, abs=0.05)
+
+
 def test_mp4_without_the_extra_is_one_sentence(stool_run, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
-    code, said = render(capsys, stool_run, "--out", tmp_path / "walk.mp4")
+    code, said = render(capsys, stool_run, "--out", tmp_path / "walk.mp4", *SMALL)
     assert code == 2
     assert f"MP4 needs an extra: {install_command('video')};" in said
 
@@ -65,7 +141,11 @@ def test_a_png_is_the_filmstrip(stool_run, tmp_path, capsys):
     [
         (["--out", "walk.avi"], ".webp, .gif"),
         (["--out", "missing/walk.webp"], "does not exist"),
-        (["--out", "walk.webp", "--fps", "0"], "between 1 and 60"),
+        (["--out", "walk.webp", "--fps", "0"], "--fps 0: must lie between 1 and 240"),
+        (["--out", "walk.webp", "--fps", "240.5"], "--fps 240.5: must lie between 1 and 240"),
+        (["--out", "walk.webp", "--fps", "nan"], "--fps nan: must lie between 1 and 240"),
+        (["--out", "walk.webp", "--fps", "fast"], "--fps"),
+        (["--out", "walk.gif", "--fps", "60"], "a GIF holds at most 50 frames per second"),
         (["--out", "walk.webp", "--generations", "a"], "such as 0,5,20"),
         (["--out", "walk.webp", "--top", "2", "--generations", "1"], "two kinds of race"),
         (["--out", "walk.webp", "--top", "99"], "between 1 and 12"),
