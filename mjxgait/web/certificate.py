@@ -31,11 +31,21 @@ TIGHTEST = 3
 SIGNS = {">=": "≥", "<=": "≤"}
 
 
-def certificate_summary(run: Path, creature: Creature, champion: Champion) -> str:
-    """Return the verdict, the margin, and the measures with the least room, as a paragraph."""
+def certificate_summary(
+    run: Path, creature: Creature, champion: Champion, fell: float = math.inf
+) -> str:
+    """Return the verdict, the margin, and the measures with the least room, as a paragraph.
+
+    A champion without a valid certificate gets the reason. fell: s of its undisturbed walk, infinite
+    if it stays up.
+    """
     document = read_certificate(run / CERTIFICATE)
-    if document is None or outdated(document, champion, creature):
-        return ""
+    falls = [f"it falls after {fell:.1f} s"] if math.isfinite(fell) else []
+    if document is None:
+        return _uncertified([*falls, "it has not been examined"], "Examine it")
+    if reason := outdated(document, champion, creature):
+        reason = reason[0].lower() + reason[1:].rstrip(".")
+        return _uncertified([*falls, reason], "Examine it again")
     verdict = verdict_of(document)
     measures = [(c.skill, m) for c in criteria_of(document) for m in c.measures]
     nearest = sorted(measures, key=lambda pair: pair[1].margin)[:TIGHTEST]
@@ -46,6 +56,12 @@ def certificate_summary(run: Path, creature: Creature, champion: Champion) -> st
     worst = f" Margin {verdict.margin:.2f}." if math.isfinite(verdict.margin) else ""
     said = f"<b>{html.escape(_said(verdict))}</b>{worst}"
     return f'<p class="verdict">{said} Tightest: {html.escape(listed)}.</p>'
+
+
+def _uncertified(reasons: Sequence[str], way_out: str) -> str:
+    """Paragraph on a champion without a valid certificate."""
+    said = html.escape(f"Not certified: {'; '.join(reasons)}.")
+    return f'<p class="verdict"><b>{said}</b> {way_out} with <code>mjxgait certify RUN</code>.</p>'
 
 
 def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:

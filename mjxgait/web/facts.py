@@ -4,6 +4,7 @@ The scripts in `assets/` read it. Names are those of
 docs/reference/controller.md; angles in rad, lengths in m.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 import mujoco
@@ -21,16 +22,22 @@ from mjxgait.controllers.sims_brain.reference import (
 )
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import support_extents
+from mjxgait.creature.ground.spec import GroundSpec
 from mjxgait.errors import UserError
 from mjxgait.reference.bodies import Water
 from mjxgait.reference.contest import contest_of
 from mjxgait.reference.controllers import reference_of
-from mjxgait.reference.layout import FLOOR, start_frame
+from mjxgait.reference.layout import FLOOR, colliding_geoms, start_frame
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.reference.state import FOOT_SENSES
 from mjxgait.reference.stepping import examined_model
+from mjxgait.reference.terrain import BEHIND, CELLS, Terrain
 
 Facts = dict[str, object]
+ROUGHEST = 0.15
+"""Largest height of rough ground above level that a visitor can choose, in hip heights."""
+REACH, LEAST_REACH, CELLS_ASIDE = 4.0, 2.0, 120
+"""Half the side of the simulated patch in body lengths, wanted and least, and its most cells."""
 OPTIONS = ("iterations", "ls_iterations", "tolerance", "disableflags")
 """Settings of the examiner's solver that differ from the creature's file."""
 
@@ -65,6 +72,9 @@ def facts_of(creature: Creature, champion: Champion) -> Facts:
         "light": light.tolist() if light.any() else None,
         "turn": None if headings is None else float(headings[1]),
         "floor": float(model.geom(FLOOR).pos[2]),
+        "roots": _roots(model, creature),
+        "ground": None if task.drag else _ground(creature, model),
+        "solid": [] if task.drag else _parts(model, colliding_geoms(model).tolist()),
         "goal": float(aims.goal[0]),
         "bar": _bounded(aims.bar[0, 0]),
         "feet": _feet(creature, seen=any(name in FOOT_SENSES for name in reference.reads)),
@@ -85,7 +95,7 @@ def _check(creature: Creature, champion: Champion) -> None:
     name = creature.name
     if champion.controller not in CONTROLLERS:
         raise UserError(
-            f"{name}: a page with physics runs key poses, expressions and brains, not the controller "
+            f"{name}: a page with physics runs key poses, expressions, networks and brains, not the controller "
             f'"{champion.controller}"; leave --physics out, and the page plays the recorded walk'
         )
     if how_simulated(champion.task).next_goal(np.ones(1), np.ones(1), np.ones(1))[0] > 1:
@@ -127,6 +137,36 @@ def _drive(creature: Creature, champion: Champion) -> Facts:
     }
 
 
+def _roots(model: mujoco.MjModel, creature: Creature) -> list[int]:
+    """Addresses in qpos of all bodies that move freely, the creature's own first."""
+    free = model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE].tolist()
+    return sorted(free, key=lambda address: (address != creature.root_qpos, address))
+
+
+def _ground(creature: Creature, model: mujoco.MjModel) -> Facts:
+    """Rough ground of one hip height, and the patch of it that is simulated about the creature.
+
+    Cells are the examiner's, or larger for a long and low body. waves: [W, 4]; see `Terrain.waves`.
+    """
+    frame = creature.frame
+    waves = Terrain(
+        GroundSpec("rough", 1.0), start_frame(creature), frame.hip_height, frame.body_length
+    ).waves
+    length = frame.body_length
+    cell = max(CELLS["rough"][0] * frame.hip_height, LEAST_REACH * length / CELLS_ASIDE)
+    return {
+        **_lists(waves=waves.T),
+        "geom": int(model.geom(FLOOR).id),
+        "name": FLOOR,
+        "hip": float(frame.hip_height),
+        "level": float(length),
+        "cell": float(cell),
+        "half": min(math.ceil(REACH * length / cell), CELLS_ASIDE),
+        "origin": float(-BEHIND * length % cell),
+        "most": ROUGHEST,
+    }
+
+
 def _parts(model: mujoco.MjModel, geoms: Sequence[int]) -> list[Facts]:
     """Geoms with the parameters of their support functions; see `support_extents`."""
     extents = [support_extents(int(model.geom_type[g]), model.geom_size[g]) for g in geoms]
@@ -148,15 +188,18 @@ def _feet(creature: Creature, seen: bool) -> Facts:
     }
 
 
+def _mirror(creature: Creature) -> Facts:
+    mirror = creature.mirror
+    return {"sign": mirror.sign.tolist(), "partner": list(mirror.partners)}
+
+
 def _poses(creature: Creature, champion: Champion) -> Facts:
     joints, weights, settings = creature.joints, creature.corrections, champion.settings
     names, tuning = gene_names(weights.steps), champion.genome["tuning"]
-    mirror, stepping = creature.mirror, weights.stepping
+    stepping = weights.stepping
     return {
         "poses": np.asarray(champion.genome["key_poses"], float).tolist(),
-        "mirror": {"sign": mirror.sign.tolist(), "partner": list(mirror.partners)}
-        if mirror.symmetric and settings.mirror
-        else None,
+        "mirror": _mirror(creature) if creature.mirror.symmetric and settings.mirror else None,
         "tuning": dict(zip(names, map(float, tuning), strict=True)),
         "interpolation": settings.interpolation,
         "advance": settings.advance,
@@ -194,6 +237,19 @@ def _program(creature: Creature, champion: Champion) -> Facts:
         "expressions": [texts[joint] for joint in creature.joints.names],
         "low": _bounded(creature.joints.pose_low),
         "high": _bounded(creature.joints.pose_high),
+    }
+
+
+def _layers(creature: Creature, champion: Champion) -> Facts:
+    joints, mirror, genome = creature.joints, creature.mirror, champion.genome
+    return {
+        "layers": [
+            _lists(weight=genome[f"weight_{i}"], bias=genome[f"bias_{i}"])
+            for i in range(len(genome) // 2)
+        ],
+        "period": float(champion.settings.period),
+        "mirror": _mirror(creature) if mirror.symmetric else None,
+        **_lists(stand=joints.stand, low=joints.pose_low, high=joints.pose_high),
     }
 
 
@@ -249,5 +305,6 @@ CONTROLLERS: Mapping[str, Callable[[Creature, Champion], Facts]] = {
     "poses": _poses,
     "program": _program,
     "brain": _brain,
+    "network": _layers,
 }
 """Facts of each kind of controller that a page can run."""

@@ -1,6 +1,7 @@
 """One HTML file in which several champions move side by side in one scene, without any network."""
 
 import base64
+import dataclasses
 import html
 from collections.abc import Sequence
 
@@ -10,6 +11,7 @@ from mjxgait.animation.export import WalkLoop, walk_loop, walk_take
 from mjxgait.animation.export.school import School, Track, build_school
 from mjxgait.errors import UserError
 from mjxgait.rendering.gallery import Entry, tally
+from mjxgait.rendering.walk import Walk
 from mjxgait.web.certificate import table
 from mjxgait.web.templates import asset, embedded, embedded_json, style, template, viewer_script
 
@@ -35,14 +37,29 @@ def build_gallery(shown: Sequence[Entry], title: str) -> str:
         facts=embedded_json({"scenes": scenes}),
         table=_table(shown),
         viewer=embedded(viewer_script()),
-        code=asset("gallery.js"),
+        code=asset("school.js") + asset("gallery.js"),
     )
 
 
-def _scene(shown: Sequence[Entry], water: bool) -> dict[str, object]:
-    """Everything that the page needs of one scene."""
-    school = build_school([_loop(one) for one in shown], water)
-    pairs = zip(shown, school.tracks, strict=True)
+@dataclasses.dataclass(frozen=True)
+class Words:
+    """What a page says of a creature in a scene.
+
+    name, does, verdict: shown together at the pointer. label: always shown beside it. well: False
+    for a bold verdict.
+    """
+
+    name: str
+    label: str
+    does: str
+    verdict: str
+    well: bool
+
+
+def scene_of(loops: Sequence[WalkLoop], words: Sequence[Words], water: bool) -> dict[str, object]:
+    """Return everything that `school.js` needs to show motions side by side in one scene."""
+    school = build_school(loops, water)
+    pairs = zip(words, school.tracks, strict=True)
     return {
         "water": water,
         "glb": base64.b64encode(school.glb).decode("ascii"),
@@ -51,12 +68,20 @@ def _scene(shown: Sequence[Entry], water: bool) -> dict[str, object]:
     }
 
 
-def _loop(one: Entry) -> WalkLoop:
-    """The motion as a loop; the whole recording, with a seam, where it never repeats."""
+def looped(walk: Walk) -> WalkLoop:
+    """Return the motion as a loop; the whole recording, with a seam, where it never repeats."""
     try:
-        return walk_loop(one.walk, RATE)
+        return walk_loop(walk, RATE)
     except UserError:
-        return walk_take(one.walk, RATE)
+        return walk_take(walk, RATE)
+
+
+def _scene(shown: Sequence[Entry], water: bool) -> dict[str, object]:
+    words = [
+        Words(one.name, one.strategy, one.does, one.doubt or CERTIFIED, one.certified)
+        for one in shown
+    ]
+    return scene_of([looped(one.walk) for one in shown], words, water)
 
 
 def _camera(school: School) -> dict[str, object]:
@@ -69,14 +94,14 @@ def _camera(school: School) -> dict[str, object]:
     }
 
 
-def _member(number: int, one: Entry, track: Track) -> dict[str, object]:
+def _member(number: int, one: Words, track: Track) -> dict[str, object]:
     return {
         "number": number,
         "name": one.name,
-        "strategy": one.strategy,
+        "strategy": one.label,
         "does": one.does,
-        "verdict": one.doubt or CERTIFIED,
-        "certified": one.certified,
+        "verdict": one.verdict,
+        "certified": one.well,
         "seconds": track.seconds,
         "parts": track.parts,
         "motion": _floats(track.bodies),

@@ -1,8 +1,8 @@
-"""Local page that shows a run as it learns: the current best walk and the fitness curve.
+"""Local page that shows a run as it learns: its best individuals side by side and the fitness curve.
 
 A separate process only reads the run folder, so it cannot disturb a training and works on a
 finished run as well. The browser plays the animation; the only cost here is one short simulation
-when the champion has changed.
+of each new individual that is shown.
 """
 
 import contextlib
@@ -19,21 +19,17 @@ from pathlib import Path
 from socket import socket
 from typing import Any
 
-import numpy as np
-
-from mjxgait.animation.export import build_glb, walk_loop, walk_take
 from mjxgait.errors import UserError
-from mjxgait.rendering.walk import record_walk
-from mjxgait.training.folder import CHAMPION, METRICS, open_champion, open_run
+from mjxgait.training.folder import METRICS, open_run
+from mjxgait.training.lock import running
 from mjxgait.training.logs import read_metrics
-from mjxgait.web.templates import asset, viewer_script
+from mjxgait.web.field import Field
+from mjxgait.web.templates import asset, style, viewer_script
 
 HERE = "127.0.0.1"
 PORTS = range(8765, 8785)
-SECONDS = 5.0
-"""Duration of the walk that is shown."""
 SHARE = 0.04
-"""Largest average share of one core for simulating new champions."""
+"""Largest average share of one core for simulations while the run is being trained."""
 PATIENCE = 1.0
 """Time between checks of the folder, s."""
 CONNECTIONS, IDLE = 32, 10.0
@@ -42,37 +38,36 @@ CONNECTIONS, IDLE = 32, 10.0
 
 @dataclasses.dataclass(frozen=True)
 class Shown:
-    """Content of the page. version: grows with each new animation; 0 while there is none."""
+    """Content of the page.
+
+    version: grows with each new scene; 0 while there is none. scene: JSON; see `gallery.scene_of`.
+    """
 
     version: int
-    what: str
-    glb: bytes
+    scene: bytes
 
 
 class Watcher:
-    """Observer of a run folder."""
+    """Observer of a run folder. trains: whether a training on this machine is known to write it."""
 
-    def __init__(self, run: Path) -> None:
+    def __init__(self, run: Path, trains: bool = False) -> None:
         """Open the run; raise UserError if it is not a run folder."""
-        self.run = run
+        self.run, self.trains = run, trains
         self.creature, _ = open_run(run)
-        self.shown = Shown(0, "waiting for the first generation", b"")
-        self._seen = 0
+        self.field = Field(run, self.creature)
+        self.shown = Shown(0, b"")
 
     def look(self) -> float:
-        """Load any new champion; return the time in s to wait before the next check."""
+        """Simulate a new individual, if any; return the time in s to wait before the next check."""
         began = time.process_time()
-        try:
-            changed = (self.run / CHAMPION).stat().st_mtime_ns
-        except FileNotFoundError:
-            return PATIENCE
-        if changed != self._seen:
-            self._seen = changed
-            # A partial file cannot occur: files are replaced atomically. Other commands report a
-            # foreign one.
-            with contextlib.suppress(UserError):
-                self.shown = self._shown()
-        return max(PATIENCE, (time.process_time() - began) * (1 / SHARE - 1))
+        # Other commands report foreign files.
+        with contextlib.suppress(UserError):
+            if self.field.advance():
+                scene = json.dumps(self.field.scene()).encode()
+                self.shown = Shown(self.shown.version + 1, scene)
+        if self.trains or running(self.run):
+            return max(PATIENCE, (time.process_time() - began) * (1 / SHARE - 1))
+        return PATIENCE if self.field.idle else 0.0
 
     def follow(self, ended: Callable[[], bool]) -> None:
         """Check repeatedly until `ended` returns true."""
@@ -81,7 +76,7 @@ class Watcher:
 
     def state(self) -> dict[str, object]:
         """Return the state that the page requests every second."""
-        what = self.shown.what
+        what = self.field.what if self.shown.version else "waiting for the first generation"
         try:
             lines = read_metrics(self.run / METRICS)
         except UserError as error:
@@ -92,22 +87,6 @@ class Watcher:
         ]
         name = self.creature.title
         return {"name": name, "what": what, "version": self.shown.version, "history": history}
-
-    def _shown(self) -> Shown:
-        creature, champion = open_champion(self.run)
-        walk = record_walk(creature, champion, SECONDS)
-        found = (
-            f"generation {champion.origin.get('generation', '?')}, fitness {champion.fitness:.2f}"
-        )
-        try:
-            if np.isfinite(walk.fell):
-                loop, gait = walk_take(walk), f"falls after {walk.fell:.1f} s"
-            else:
-                loop = walk_loop(walk)
-                gait = f"{loop.speed:.2f} m/s"
-        except UserError:
-            loop, gait = walk_take(walk), "completes no steady stride yet"
-        return Shown(self.shown.version + 1, f"{found}: {gait}", build_glb(loop))
 
 
 def serve(
@@ -121,11 +100,12 @@ def serve(
     Args:
       port: on this machine; by default the first free one.
       ready: called with the address.
+      wait: returns when the training that writes the run has ended.
 
     Raises:
       UserError: not a run folder, or the port is taken.
     """
-    watcher = Watcher(run)
+    watcher = Watcher(run, trains=wait is not None)
     if hasattr(os, "nice"):
         os.nice(5)
     server = open_server(watcher, port)
@@ -214,10 +194,14 @@ class _Handler(BaseHTTPRequestHandler):
                 self._send(asset("live.html").encode(), "text/html; charset=utf-8")
             case "/viewer.js":
                 self._send(viewer_script().encode(), "text/javascript")
+            case "/style.css":
+                self._send(style().encode(), "text/css; charset=utf-8")
+            case "/school.js":
+                self._send(asset("school.js").encode(), "text/javascript; charset=utf-8")
             case "/state.json":
                 self._send(json.dumps(self.follows.state()).encode(), "application/json")
-            case "/walk.glb" if self.follows.shown.version:
-                self._send(self.follows.shown.glb, "model/gltf-binary")
+            case "/scene.json" if self.follows.shown.version:
+                self._send(self.follows.shown.scene, "application/json")
             case _:
                 self.send_error(HTTPStatus.NOT_FOUND)
 

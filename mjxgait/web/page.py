@@ -35,7 +35,7 @@ def write_page(run: Path, out: Path) -> str:
     """
     creature, champion = open_champion(run)
     walk = record_walk(creature, champion, LOOP_SECONDS)
-    verdict = certificate_summary(run, creature, champion)
+    verdict = certificate_summary(run, creature, champion, walk.fell)
     sections = _sections(run, creature, champion, walk)
     page = build_page(walk, walk_loop(walk, RATE), verdict, sections)
     save_page(out, page)
@@ -159,6 +159,7 @@ def driven_page(
     glb, apart = build_driven(loops)
     return template("drive.html").substitute(
         title=html.escape(creature.title),
+        style=style(),
         walks=len(clips) - 1,
         of=of,
         blends=html.escape(blends),

@@ -15,7 +15,7 @@ from mjxgait.creature.geometry import posed
 from mjxgait.rendering.painter import seen_geoms
 from mjxgait.rendering.walk import doubt, record_walk
 from mjxgait.training.folder import open_champion
-from mjxgait.web.facts import Facts, facts_of
+from mjxgait.web.facts import ROUGHEST, Facts, facts_of
 from mjxgait.web.page import save_page
 from mjxgait.web.templates import asset, embedded, embedded_json, style, template, viewer_script
 from mjxgait.web.wasm import PACKAGE, VERSION, Engine, engine_from
@@ -25,8 +25,10 @@ SECONDS = 5.0
 CLASSES = {
     "key_poses.js": "KeyPoses",
     "expressions.js": "Expressions",
+    "network.js": "Network",
     "brain.js": "Brain",
     "water.js": "Water",
+    "ground.js": "Ground",
     "simulation.js": "Simulation",
     "view.js": "View",
 }
@@ -108,6 +110,7 @@ def build_physics_page(
         wide=f"{np.degrees(WIDE):g}deg",
         far=f"{far:.3f}m",
         farthest=f"{FARTHEST * far:.3f}m",
+        roughest=f"{100 * ROUGHEST:g}",
         facts=embedded_json(facts),
         page=embedded_json(page),
         # The same bytes on every day and machine.

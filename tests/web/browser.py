@@ -2,6 +2,7 @@
 
 import base64
 import io
+import re
 import shutil
 import time
 
@@ -42,9 +43,9 @@ def new_tab(browser, width, height, **settings):
     return tab
 
 
-def watched_tab(browser, address):
+def watched_tab(browser, address, **settings):
     """A loaded page, its errors, and the addresses it requested."""
-    tab = new_tab(browser, 900, 700)
+    tab = new_tab(browser, 900, 700, **settings)
     wrong, asked = [], []
     tab.on(
         "console", lambda message: wrong.append(message.text) if message.type == "error" else None
@@ -62,6 +63,29 @@ def wait_until(tab, expression, seconds=60):
     while not tab.evaluate(expression):
         assert time.monotonic() < end, f"{expression} did not come true in {seconds} s"
         tab.wait_for_timeout(100)
+
+
+PHONE = {"has_touch": True, "is_mobile": True}
+"""Settings of a tab on a device with a touch screen."""
+
+
+def lightness(tab):
+    """Lightness 0 to 1 of a page's background and of its text."""
+    colours = tab.evaluate(
+        "[[document.body, 'backgroundColor'], [document.querySelector('h1'), 'color']]"
+        ".map(([element, what]) => getComputedStyle(element)[what])"
+    )
+    return [np.mean([int(part) for part in re.findall(r"\d+", text)[:3]]) / 255 for text in colours]
+
+
+def check_dark(browser, address):
+    """Check that a page is dark with light text where the user wants that, and light elsewhere."""
+    for scheme, dark in (("light", False), ("dark", True)):
+        tab, wrong, _ = watched_tab(browser, address, color_scheme=scheme)
+        paper, ink = lightness(tab)
+        assert (paper < 0.2, ink > 0.7) == (dark, dark), scheme
+        assert wrong == []
+        tab.close()
 
 
 def canvas(tab):

@@ -4,6 +4,7 @@ The browser test needs Chromium (apt: chromium) and playwright.
 """
 
 import contextlib
+import dataclasses
 import http.client
 import json
 import os
@@ -17,13 +18,15 @@ import urllib.request
 
 import pytest
 from rendering.made_up import falling, metrics_line, treading, write_run
-from web.browser import drawn, wait_until, watched_tab
+from web.browser import check_dark, drawn, wait_until, watched_tab
+from web.learning import GENERATION, begun, store
 
 from mjxgait.champion import write_champion
 from mjxgait.cli.view import following
 from mjxgait.errors import UserError
 from mjxgait.rendering.walk import record_walk
 from mjxgait.training.folder import CHAMPION, METRICS
+from mjxgait.web.field import COUNT
 from mjxgait.web.live import (
     HERE,
     SHARE,
@@ -37,15 +40,22 @@ def run(stool, tmp_path):
     return write_run(tmp_path / "run", stool, generations=2)
 
 
+@contextlib.contextmanager
+def serving(watcher):
+    """The address of the page of a watcher that updates on demand."""
+    server = open_server(watcher, 0)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://{HERE}:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
 @pytest.fixture
 def site(run):
     """A watcher that updates on demand, and the address of its page."""
     watcher = Watcher(run)
-    server = open_server(watcher, 0)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield watcher, f"http://{HERE}:{server.server_port}"
-    server.shutdown()
-    server.server_close()
+    with serving(watcher) as address:
+        yield watcher, address
 
 
 def improve(run, creature, champion):
@@ -71,7 +81,7 @@ def test_the_page_follows_the_run(site, run, stool):
     state = json.loads(get(f"{address}/state.json"))
     assert state["version"] == 1
     assert [line["generation"] for line in state["history"]] == [0, 1, 2]
-    assert get(f"{address}/walk.glb")[:4] == b"glTF"
+    assert len(json.loads(get(f"{address}/scene.json"))["members"]) == 1
     watcher.look()
     assert json.loads(get(f"{address}/state.json"))["version"] == 1
 
@@ -83,18 +93,37 @@ def test_a_champion_that_falls_is_shown_falling(tmp_path):
     creature = load_creature(find_creature("tall_quadruped"))
     watcher = Watcher(write_run(tmp_path / "run", creature, falling(creature)))
     watcher.look()
-    assert "falls after" in watcher.shown.what
-    assert watcher.shown.glb
+    assert "falls after" in watcher.state()["what"]
+    assert watcher.shown.scene
 
 
 def test_a_longer_update_is_followed_by_a_longer_pause(run, stool, monkeypatch):
     """Updates take a small share of a core, even on a slow machine."""
-    watcher = Watcher(run)
     improve(run, stool, treading(stool))
-    began_and_ended = iter([100.0, 103.0])
-    monkeypatch.setattr("mjxgait.web.live.time.process_time", lambda: next(began_and_ended))
-    assert 3.0 / (3.0 + watcher.look()) == pytest.approx(SHARE)
+    # The second run is known to be in training, the first by its lock.
+    for trains, lock in ((False, "process 7 on another"), (True, None)):
+        began_and_ended, watcher = iter([100.0, 103.0]), Watcher(run, trains)
+        with monkeypatch.context() as patch:
+            patch.setattr("mjxgait.web.live.running", lambda run, lock=lock: lock)
+            patch.setattr("mjxgait.web.live.time.process_time", began_and_ended.__next__)
+            assert 3.0 / (3.0 + watcher.look()) == pytest.approx(SHARE)
     assert SHARE <= 0.05
+
+
+def test_the_page_is_dark_where_the_user_wants_that(browser, site, run, stool):
+    watcher, address = site
+    improve(run, stool, treading(stool))
+    watcher.look()
+    check_dark(browser, address)
+
+
+def test_a_run_that_is_not_trained_is_shown_at_once(tmp_path):
+    experiment = begun(tmp_path / "run", "key poses")
+    store(tmp_path / "run", experiment)
+    watcher = Watcher(tmp_path / "run")
+    assert watcher.look() == 0.0
+    assert watcher.shown.version == 1
+    assert not watcher.field.idle
 
 
 def test_only_a_new_champion_is_simulated(run, stool, monkeypatch):
@@ -104,20 +133,30 @@ def test_only_a_new_champion_is_simulated(run, stool, monkeypatch):
         seen.append(champion)
         return record_walk(creature, champion, seconds)
 
-    monkeypatch.setattr("mjxgait.web.live.record_walk", counted)
+    monkeypatch.setattr("mjxgait.web.field.record_walk", counted)
     watcher = Watcher(run)
-    for champions in (1, 2):
-        improve(run, stool, treading(stool))
+    for champions, degrees in ((1, 4.0), (2, 5.0), (2, 5.0)):
+        improve(run, stool, treading(stool, degrees))
         for _ in range(3):
             watcher.look()
-        assert len(seen) == champions
+        assert len(seen) == watcher.shown.version == champions
+
+
+def test_the_line_names_the_latest_generation_of_the_same_champion(run, stool):
+    watcher, champion = Watcher(run), treading(stool)
+    for generation in (7, 8):
+        origin = champion.origin | {"generation": generation}
+        improve(run, stool, dataclasses.replace(champion, origin=origin))
+        watcher.look()
+        assert f"generation {generation}, fitness 1.00" in watcher.state()["what"]
+    assert watcher.shown.version == 1
 
 
 def test_only_this_machine_can_reach_the_page(site):
     _, address = site
     with pytest.raises(urllib.error.HTTPError, match="403"):
         get(f"{address}/state.json", Host="evil.example")
-    for path in ("/../config.toml", "/config.toml", "/walk.glb"):
+    for path in ("/../config.toml", "/config.toml", "/scene.json"):
         with pytest.raises(urllib.error.HTTPError, match="404"):
             get(address + path)
 
@@ -182,23 +221,29 @@ def test_a_training_can_be_followed(run, capfd):
         get(address)
 
 
-def test_the_page_shows_the_champion_and_the_curve_grows(browser, site, run, stool):
-    watcher, address = site
-    improve(run, stool, treading(stool, degrees=12.0))
+def test_the_page_shows_the_best_side_by_side_and_the_curve_grows(browser, tmp_path):
+    experiment = begun(tmp_path / "run", "key poses")
+    store(tmp_path / "run", experiment)
+    watcher = Watcher(tmp_path / "run")
     watcher.look()
-    tab, wrong, asked = watched_tab(browser, address)
-    drawn(tab)
-    assert "generation" in tab.inner_text("#what")
-    before = tab.inner_html("#curve")
-    improve(run, stool, treading(stool, degrees=8.0))
-    watcher.look()
-    wait_until(
-        tab,
-        "document.getElementById('walk').src.includes('version=2') && "
-        "document.getElementById('walk').loaded",
-    )
-    assert tab.inner_html("#curve") != before
-    drawn(tab)
-    assert wrong == []
-    assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
-    tab.close()
+    with serving(watcher) as address:
+        tab, wrong, asked = watched_tab(browser, address)
+        drawn(tab)
+        assert "generation" in tab.inner_text("#what")
+        assert tab.evaluate("school.members.length") == 1
+        before = tab.inner_html("#curve")
+        while not watcher.field.idle:
+            watcher.look()
+        store(tmp_path / "run", experiment, GENERATION + 5)
+        wait_until(tab, f"school.members.length === {COUNT}")
+        wait_until(tab, "document.querySelectorAll('.stage').length === 1")
+        place = "school.members[8].nodes[1].position.toArray().join()"
+        wait_until(tab, f"{place} !== '{tab.evaluate(place)}'")
+        assert tab.locator(".label").count() == COUNT
+        drawn(tab)
+        tab.evaluate("school.show(school.members[1])")
+        assert "number 2" in tab.inner_text(".card")
+        wait_until(tab, f"document.getElementById('curve').innerHTML !== `{before}`")
+        assert wrong == []
+        assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
+        tab.close()

@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 from helpers import made_up_certificate
 from rendering.made_up import treading, write_run
-from web.browser import canvas, drawn, is_blank, new_tab, wait_until, watched_tab
+from web.browser import (
+    PHONE,
+    canvas,
+    check_dark,
+    drawn,
+    is_blank,
+    new_tab,
+    wait_until,
+    watched_tab,
+)
 
 from mjxgait.certification import Certificate, CertificateConfig, Criterion, Measure
 from mjxgait.certification.stress import Stress, StressConfig, Trial
@@ -64,7 +73,7 @@ def opened(browser, page):
 def test_the_canvas_shows_a_creature_that_moves(opened):
     tab, _, _ = opened
     first = drawn(tab)
-    assert tab.evaluate("walk.availableAnimations") == ["walk"]
+    assert len(tab.evaluate("walk.availableAnimations")) == 1
     for _ in range(20):
         tab.wait_for_timeout(130)
         if np.abs(canvas(tab) - first).mean() > 0.1:
@@ -98,6 +107,14 @@ def test_a_moment_can_be_chosen_and_stepped(opened):
     for _ in range(2):
         tab.click('[aria-label="one frame back"]')
     assert tab.evaluate("walk.currentTime") == pytest.approx(4 * frame)
+
+
+def test_a_page_without_examination_says_so_at_the_top(opened):
+    tab, _, _ = opened
+    said = tab.locator(".verdict")
+    assert "Not certified: it has not been examined." in said.inner_text()
+    walk = tab.locator("#stage").bounding_box()
+    assert said.bounding_box()["y"] < walk["y"]
 
 
 def test_keys_pause_and_step(opened):
@@ -151,11 +168,34 @@ def pressed(tab):
     return tab.locator('.view[aria-pressed="true"]').all_inner_texts()
 
 
-def test_the_page_fits_a_phone(browser, page):
-    tab = new_tab(browser, 390, 844)
+def test_the_page_fits_a_phone_and_speaks_of_fingers(browser, page):
+    tab = new_tab(browser, 390, 844, **PHONE)
     tab.goto(page.as_uri())
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+    assert "pinch" in tab.inner_text("body")
+    assert "scroll" not in tab.inner_text("body")
     tab.close()
+    tab = new_tab(browser, 390, 844)
+    tab.goto(page.as_uri())
+    assert "scroll" in tab.inner_text("body")
+    assert "pinch" not in tab.inner_text("body")
+    tab.close()
+
+
+def test_the_page_is_dark_where_the_user_wants_that(browser, page):
+    check_dark(browser, page.as_uri())
+
+
+def test_the_walk_and_its_buttons_fill_the_screen(opened):
+    tab, _, _ = opened
+    before = tab.locator("#walk").bounding_box()
+    tab.click("#full")
+    wait_until(tab, "document.fullscreenElement?.id === 'stage'")
+    wait_until(tab, f"document.getElementById('walk').clientHeight > {before['height'] + 20}")
+    assert tab.is_visible("#play")
+    assert not tab.evaluate("document.fullscreenElement.contains(document.querySelector('h2'))")
+    tab.click("#full")
+    wait_until(tab, "!document.fullscreenElement")
 
 
 def test_a_blank_canvas_is_noticed(browser, page, tmp_path):
@@ -218,9 +258,16 @@ def test_only_a_certificate_of_this_champion_is_shown(stool, tmp_path):
 def test_the_verdict_and_the_tightest_measures_come_first(stool, tmp_path):
     champion = treading(stool)
     run = write_run(tmp_path / "run", stool, champion)
-    assert certificate_summary(run, stool, champion) == ""
+    falls = certificate_summary(run, stool, champion, 1.42)
+    assert "<b>Not certified: it falls after 1.4 s; it has not been examined.</b>" in falls
+    assert "Examine it with <code>mjxgait certify RUN</code>." in falls
     (run / CERTIFICATE).write_text(json.dumps(CERTIFIED))
-    assert certificate_summary(run, stool, champion) == ""
+    old = certificate_summary(run, stool, champion)
+    assert "<b>Not certified: the certificate is outdated: it was given to another champion" in old
+    assert "Examine it again with <code>mjxgait certify RUN</code>." in old
+    early = {key: value for key, value in CERTIFIED.items() if key != "champion"}
+    (run / CERTIFICATE).write_text(json.dumps(early))
+    assert "as those of earlier versions.</b>" in certificate_summary(run, stool, champion)
     (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
     short = certificate_summary(run, stool, champion)
     assert "Not all criteria pass." in short

@@ -6,21 +6,25 @@ playwright.
 
 import dataclasses
 import json
+import time
+from pathlib import Path
 
 import pytest
 from helpers import said_by
 from rendering.made_up import falling, treading, write_run
 from web.brains import with_a_brain
-from web.browser import drawn, new_tab, wait_until, watched_tab
+from web.browser import PHONE, canvas, drawn, new_tab, wait_until, watched_tab
 from web.engine import engine_folder
 
 from mjxgait.creature.ground.spec import parse_ground
 from mjxgait.errors import UserError
 from mjxgait.experiments.repertoire.grid import GRID
+from mjxgait.training.folder import open_champion
 from mjxgait.web.facts import facts_of
 from mjxgait.web.physics import build_physics_page
 from mjxgait.web.wasm import engine_from
 
+WALK = Path(__file__).parents[2] / "docs" / "data" / "walk"
 STARTED = "document.getElementById('walk').dataset.time > 0"
 
 
@@ -46,6 +50,8 @@ def tab(opened):
     """The page with the creature standing, and all sliders as evolved."""
     tab, _, _ = opened
     tab.click("text=As evolved")
+    # The click has scrolled down to the button.
+    tab.evaluate("scrollTo(0, 0)")
     if shown(tab)["paused"]:
         tab.keyboard.press(" ")
     tab.keyboard.press("r")
@@ -117,18 +123,87 @@ def test_a_slope_makes_it_slide(tab):
     assert tab.inner_text('output[for="uphill"]') == "20°"
 
 
+def slide(tab, slider, value):
+    tab.evaluate(f"{slider}.value = {value}; {slider}.dispatchEvent(new Event('input'))")
+
+
+def test_the_floor_gets_rough_and_level_again(tab):
+    level = filled(drawn(tab))
+    slide(tab, "rough", 15)
+    assert tab.inner_text('output[for="rough"]') == "15 %"
+    # Rough ground is a surface, the level floor a few tiles.
+    until(lambda: filled(canvas(tab)) > 3 * level)
+    before = shown(tab)["time"]
+    wait_until(tab, f"walk.dataset.time > {before + 0.3}")
+    assert shown(tab)["lies"] is False
+    tab.click("text=As evolved")
+    assert tab.inner_text('output[for="rough"]') == "0 %"
+    until(lambda: filled(canvas(tab)) < 1.5 * level)
+
+
+def filled(picture):
+    """Share of a canvas on which something is drawn."""
+    return (picture[..., 3] > 0).mean()
+
+
+def until(holds, seconds=30):
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, f"did not come true in {seconds} s"
+        time.sleep(0.2)
+
+
+def test_a_slower_cycle_walks_slower(browser, tmp_path):
+    """The walk of the documentation, at the speed that it evolved and at half of it."""
+    creature, champion = open_champion(WALK)
+    engine, file = engine_from(engine_folder()), tmp_path / "walk.html"
+    page = build_physics_page(creature, facts_of(creature, champion), engine)
+    file.write_text(page, encoding="utf-8")
+    tab, wrong, _ = watched_tab(browser, file.as_uri())
+    wait_until(tab, STARTED)
+    ways = []
+    for pace in (1, 0.5):
+        slide(tab, "pace", pace)
+        tab.keyboard.press("r")
+        wait_until(tab, "walk.dataset.time < 1")
+        wait_until(tab, "walk.dataset.time >= 2.0")
+        now = shown(tab)
+        ways.append(now["ahead"] / now["time"])
+    assert ways[0] > 0.5
+    assert 0.1 < ways[1] / ways[0] < 0.8
+    assert wrong == []
+    tab.close()
+
+
 def test_it_fits_a_phone_and_answers_a_finger(browser, page, tab):
     # An animated page takes more than a core; a paused one takes none.
     tab.keyboard.press(" ")
-    tab = new_tab(browser, 390, 844, has_touch=True, is_mobile=True)
+    tab = new_tab(browser, 390, 844, **PHONE)
     tab.goto(page.as_uri())
     wait_until(tab, STARTED)
+    drag(tab)
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
     assert "pinch" in tab.inner_text("body")
     assert "scroll" not in tab.inner_text("body")
     tab.tap("text=Pause")
     wait_until(tab, "walk.dataset.paused === 'true'")
     tab.close()
+
+
+def drag(tab):
+    """Pull the seat of the stool up by a finger, and let it go."""
+    tab.locator("#walk").scroll_into_view_if_needed()
+    box, finger = tab.locator("#walk").bounding_box(), tab.context.new_cdp_session(tab)
+    x, y = box["x"] + box["width"] / 2, box["y"] + 0.49 * box["height"]
+    orbit, way = tab.evaluate("walk.getCameraOrbit().theta"), [(0, 0), (15, -30), (30, -60)]
+    for n, (right, down) in enumerate(way):
+        kind, place = "touchMove" if n else "touchStart", {"x": x + right, "y": y + down}
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [place]})
+    wait_until(tab, "walk.dataset.pulled === 'true'")
+    assert tab.evaluate("document.querySelector('line.string').style.visibility") == "visible"
+    finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    wait_until(tab, "walk.dataset.pulled === 'false'")
+    assert tab.evaluate("walk.getCameraOrbit().theta") == pytest.approx(orbit)
 
 
 def test_a_swimmer_has_a_light_and_no_floor(browser, tmp_path):
@@ -138,6 +213,7 @@ def test_a_swimmer_has_a_light_and_no_floor(browser, tmp_path):
     tab, wrong, _ = watched_tab(browser, file.as_uri())
     wait_until(tab, STARTED)
     assert not tab.is_visible("#uphill")
+    assert not tab.is_visible("#rough")
     assert tab.is_visible("#mass")
     light = "['cx', 'cy'].map(k => document.querySelector('circle.light').getAttribute(k)).join()"
     before, apart = tab.evaluate(light), shown(tab)["apart"]
@@ -154,7 +230,7 @@ def test_a_swimmer_has_a_light_and_no_floor(browser, tmp_path):
 def test_a_controller_or_ground_that_a_page_cannot_run_is_refused(stool):
     champion = treading(stool)
     other = dataclasses.replace(champion, controller="sims")
-    with pytest.raises(UserError, match=r'expressions and brains, not the controller "sims"'):
+    with pytest.raises(UserError, match=r'networks and brains, not the controller "sims"'):
         facts_of(stool, other)
     with pytest.raises(UserError, match=r'those of "travel" move on'):
         facts_of(stool, dataclasses.replace(champion, task="travel"))

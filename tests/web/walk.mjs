@@ -8,15 +8,18 @@ const mujoco = await (await of(`${engine}/mujoco.js`)).default();
 const { KeyPoses } = await of(`${assets}/key_poses.js`);
 const { Expressions } = await of(`${assets}/expressions.js`);
 const { Brain } = await of(`${assets}/brain.js`);
+const { Network } = await of(`${assets}/network.js`);
 const { Water } = await of(`${assets}/water.js`);
+const { Ground } = await of(`${assets}/ground.js`);
 const { Simulation } = await of(`${assets}/simulation.js`);
-const CONTROLLERS = { poses: KeyPoses, program: Expressions, brain: Brain };
+const CONTROLLERS = { poses: KeyPoses, program: Expressions, brain: Brain, network: Network };
 
-function walk({ facts, steps, disturbed, push }) {
+function walk({ facts, steps, disturbed, push, rough }) {
   const controller = new CONTROLLERS[facts.kind](facts.controller);
   const water = facts.water && new Water(facts.water);
   const opponent = facts.opponent && new CONTROLLERS[facts.kind](facts.opponent.controller);
-  const simulation = new Simulation(mujoco, facts, controller, water, opponent);
+  const ground = facts.ground && new Ground(facts.ground, facts.start);
+  const simulation = new Simulation(mujoco, facts, controller, { water, opponent, ground });
   if (disturbed) {
     simulation.setMass(disturbed.mass);
     simulation.setFriction(disturbed.friction);
@@ -24,9 +27,15 @@ function walk({ facts, steps, disturbed, push }) {
     simulation.reset();
   }
   const qpos = [],
-    target = [];
+    target = [],
+    lowest = [];
   for (let k = 0; k < steps; k++) {
     if (push?.step === k) simulation.push(...push.speed);
+    for (const { step, size } of rough ?? [])
+      if (step === k) {
+        simulation.setRough(size);
+        lowest.push(Math.min(...facts.solid.map(part => simulation.height(part))));
+      }
     qpos.push([...simulation.data.qpos]);
     simulation.step();
     target.push(simulation.target);
@@ -34,6 +43,9 @@ function walk({ facts, steps, disturbed, push }) {
   return {
     qpos,
     target,
+    lowest,
+    last: [...simulation.data.qpos],
+    heights: facts.solid.map(part => simulation.height(part)),
     fell: simulation.fell === Infinity ? null : simulation.fell,
     pulls: pulls(simulation),
   };

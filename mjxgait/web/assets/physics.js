@@ -1,8 +1,9 @@
 // The page with physics: loads MuJoCo, keeps real time, and lets a visitor disturb the creature.
 //
 // Scripts before it define these.
-const { KeyPoses, Expressions, Brain, Water, Simulation, View, loadMujoco } = globalThis;
-const CONTROLLERS = { poses: KeyPoses, program: Expressions, brain: Brain };
+const { KeyPoses, Expressions, Network, Brain, Water, Ground, Simulation, View, loadMujoco } =
+  globalThis;
+const CONTROLLERS = { poses: KeyPoses, program: Expressions, network: Network, brain: Brain };
 
 const element = id => document.getElementById(id);
 const json = id => JSON.parse(element(id).textContent);
@@ -28,7 +29,8 @@ async function start() {
   const controller = new CONTROLLERS[facts.kind](facts.controller);
   const water = facts.water && new Water(facts.water);
   const opponent = facts.opponent && new CONTROLLERS[facts.kind](facts.opponent.controller);
-  const simulation = new Simulation(mujoco, facts, controller, water, opponent);
+  const ground = facts.ground && new Ground(facts.ground, facts.start);
+  const simulation = new Simulation(mujoco, facts, controller, { water, opponent, ground });
   showControls(facts);
   const view = new View(viewer, element("overlay"), page);
   const state = {
@@ -55,7 +57,7 @@ function showControls({ kind, water, light }) {
     element(id).closest("label").hidden = hidden;
   };
   hide("pace", kind !== "poses");
-  for (const id of ["uphill", "aside", "friction"]) hide(id, water !== null);
+  for (const id of ["uphill", "aside", "rough", "friction"]) hide(id, water !== null);
   for (const part of document.querySelectorAll(".lit")) part.hidden = light === null;
   document.body.classList.toggle("water", water !== null);
 }
@@ -221,6 +223,7 @@ function connectSliders({ simulation, state }) {
   const change = {
     uphill: slope,
     aside: slope,
+    rough: () => simulation.setRough(value("rough") / 100),
     friction: () => simulation.setFriction(value("friction")),
     mass: () => simulation.setMass(value("mass")),
     pace: () => {

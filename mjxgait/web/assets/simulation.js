@@ -24,12 +24,11 @@ const CONTACT_GAP = 0.002;
 export class Simulation {
   // facts: of mjxgait/web/facts.py. controller: has `init` and `act`, as in key_poses.js. water: has
   // `press`, as in water.js; null on land. opponent: the controller of `facts.opponent`; null without.
-  constructor(mujoco, facts, controller, water = null, opponent = null) {
-    Object.assign(this, { mujoco, facts, controller, water, opponent });
-    this.model = mujoco.MjModel.from_xml_string(facts.xml);
-    for (const [name, value] of Object.entries(facts.options)) this.model.opt[name] = value;
-    this.data = new mujoco.MjData(this.model);
-    this.scratch = new mujoco.MjData(this.model);
+  // ground: of ground.js, level at first; null in water.
+  constructor(mujoco, facts, controller, { water = null, opponent = null, ground = null } = {}) {
+    Object.assign(this, { mujoco, facts, controller, water, opponent, ground });
+    this.plane = this.simulated(mujoco.MjModel.from_xml_string(facts.xml));
+    Object.assign(this, this.plane, { changed: { mass: 1, friction: 1, slope: [0, 0] } });
     const { body_mass, body_inertia, geom_friction, opt, M_rownnz, M_colind } = this.model;
     this.plain = {
       mass: [...body_mass],
@@ -48,10 +47,18 @@ export class Simulation {
     this.reset();
   }
 
-  // Start again from the standing pose; mass, friction and slope stay.
+  // A model with the solver's settings, and the data that are simulated with it.
+  simulated(model) {
+    const { mujoco, facts } = this;
+    for (const [name, value] of Object.entries(facts.options)) model.opt[name] = value;
+    return { model, data: new mujoco.MjData(model), scratch: new mujoco.MjData(model) };
+  }
+
+  // Start again from the standing pose; mass, friction, slope and floor stay.
   reset() {
     const { mujoco, model, data, facts } = this;
     mujoco.mj_resetData(model, data);
+    if (this.ground?.size) this.layGround(facts.start.place);
     data.qpos.set(facts.stand_qpos);
     Object.assign(this, { steps: 0, fell: Infinity, heading: 0, pull: null });
     this.forces = new Float64Array(model.nv);
@@ -72,6 +79,7 @@ export class Simulation {
 
   // Factors on every body's mass and inertia, and on sliding friction.
   setMass(factor) {
+    this.changed.mass = factor;
     const { body_mass, body_inertia } = this.model,
       { mass, inertia } = this.plain;
     body_mass.set(mass.map(value => factor * value));
@@ -81,6 +89,7 @@ export class Simulation {
   }
 
   setFriction(factor) {
+    this.changed.friction = factor;
     this.model.geom_friction.set(
       this.plain.friction.map((value, i) => (i % 3 ? value : factor * value)),
     );
@@ -89,6 +98,7 @@ export class Simulation {
 
   // Slope of the floor in rad along the world's x and y. Gravity tilts instead of the floor.
   setSlope(x, y) {
+    this.changed.slope = [x, y];
     const angle = Math.hypot(x, y),
       { gravity } = this.plain,
       size = Math.hypot(...gravity);
@@ -100,6 +110,43 @@ export class Simulation {
     ];
     this.model.opt.gravity.set(gravity.map((value, i) => value + size * change[i]));
     this.renew();
+  }
+
+  // Make the floor rough, at most `size` hip heights above and below level; 0 is the plane again. A
+  // creature that the new floor would bury is lifted.
+  setRough(size) {
+    const { ground, mujoco, facts, data } = this,
+      lowest = () => Math.min(...facts.solid.map(part => this.height(part))),
+      before = Math.min(lowest(), 0);
+    ground.size = size;
+    if (size) this.rough ??= this.roughWorld();
+    const next = size ? this.rough : this.plane,
+      qpos = [...data.qpos],
+      rise = Math.max(before - lowest(), 0);
+    for (const address of facts.roots) qpos[address + 2] += rise;
+    next.data.qpos.set(qpos);
+    next.data.qvel.set(data.qvel);
+    next.data.qacc_warmstart.set(data.qacc_warmstart);
+    Object.assign(this, next);
+    if (size) this.layGround(qpos.slice(facts.roots[0]));
+    this.setMass(this.changed.mass);
+    this.setFriction(this.changed.friction);
+    this.setSlope(...this.changed.slope);
+  }
+
+  // The creature on a height field, which goes along with it.
+  roughWorld() {
+    const { mujoco, facts, ground } = this,
+      world = this.simulated(ground.model(mujoco, facts));
+    // This search for contacts takes the field to be where the compiler put it.
+    world.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE.value;
+    return world;
+  }
+
+  // Put the patch of rough floor about a place.
+  layGround([x, y]) {
+    this.ground.centre(x, y);
+    this.ground.place(this.model);
   }
 
   // Change the trunk's horizontal velocity at once, m/s along the world's x and y.
@@ -126,6 +173,8 @@ export class Simulation {
     this.applyPull();
     mujoco.mj_step2(model, data);
     this.forces.set(data.qfrc_constraint);
+    const [x, y] = three(data.xpos, facts.trunk);
+    if (this.ground?.size && this.ground.leaves(x, y)) this.layGround([x, y]);
     mujoco.mj_step1(model, data);
     this.steps += 1;
     if (this.turn !== null) this.heading += this.turn * facts.step;
@@ -167,7 +216,7 @@ export class Simulation {
       roll: Math.asin(clip(left[2], -1, 1)),
       pitch_rate: dot(spin, left),
       roll_rate: dot(spin, forward),
-      ...(facts.feet.seen ? this.footSenses(forward, place, qvel) : {}),
+      ...this.noseSenses(forward, place, qvel.slice(root_dof, root_dof + 3)),
     };
   }
 
@@ -182,7 +231,7 @@ export class Simulation {
       time,
       beat: 2 * (time - Math.floor(time)) - 1,
       joint_vel: facts.joints.dofs.map(dof => data.qvel[dof]),
-      trunk_height: place[2],
+      trunk_height: place[2] - this.floorAt(place),
       forward,
       aside: dot(moved, start.left),
       forward_vel: dot(velocity, start.forward),
@@ -192,13 +241,20 @@ export class Simulation {
     };
   }
 
-  footSenses(forward, place, qvel) {
-    const { feet, root_dof } = this.facts,
-      { geom_xpos } = this.data;
+  // Observations along the nose and to its left; those of feet only if the controller reads them.
+  noseSenses(forward, place, velocity) {
     const length = Math.max(Math.hypot(forward[0], forward[1]), 1e-6);
     const nose = [forward[0] / length, forward[1] / length, 0],
       beside = cross([0, 0, 1], nose);
-    const velocity = qvel.slice(root_dof, root_dof + 3);
+    return {
+      nose_vel: [dot(velocity, nose), dot(velocity, beside)],
+      ...(this.facts.feet.seen ? this.footSenses(place, nose, beside) : {}),
+    };
+  }
+
+  footSenses(place, nose, beside) {
+    const { feet } = this.facts,
+      { geom_xpos } = this.data;
     const middle = geoms =>
       [0, 1, 2].map(
         axis => geoms.reduce((sum, { geom }) => sum + geom_xpos[3 * geom + axis], 0) / geoms.length,
@@ -214,7 +270,6 @@ export class Simulation {
         const away = minus(middle(geoms), place);
         return [dot(away, nose), dot(away, beside)];
       }),
-      nose_vel: [dot(velocity, nose), dot(velocity, beside)],
     };
   }
 
@@ -252,10 +307,18 @@ export class Simulation {
     );
   }
 
+  // Height of the rough floor at a place; 0 on the plane.
+  floorAt([x, y]) {
+    return this.ground?.size ? this.ground.height(x, y) : 0;
+  }
+
   // Height of a geom's lowest point above the floor: the sum of a sphere, a box and an ellipsoid.
-  height({ geom, radius, box, ellipsoid }) {
-    const { geom_xpos, geom_xmat } = this.data,
+  height(part) {
+    const { geom, radius, box, ellipsoid } = part,
+      { geom_xpos, geom_xmat } = this.data,
       down = three(geom_xmat, 3 * geom + 2);
+    if (this.ground?.size)
+      return this.ground.above(part, three(geom_xpos, geom), geom_xmat.slice(9 * geom, 9 * geom + 9));
     const reach =
       radius + dot(down.map(Math.abs), box) + Math.hypot(...down.map((d, i) => d * ellipsoid[i]));
     return geom_xpos[3 * geom + 2] - reach - this.facts.floor;
@@ -382,7 +445,8 @@ export class Simulation {
     const { data, facts } = this,
       { trunk, axes, fall, stand_height, forbidden } = facts;
     const up = dot(three(data.xmat, 3 * trunk + 2), axes.up),
-      high = data.xpos[3 * trunk + 2] / stand_height;
+      place = three(data.xpos, trunk),
+      high = (place[2] - this.floorAt(place)) / stand_height;
     const sane = data.qvel.every(value => Math.abs(value) < BLOWN_UP);
     const fine = sane && up > fall.min_up && high > fall.height[0] && high < fall.height[1];
     return !fine || (fall.touch && forbidden.some(part => !(this.height(part) > 0)));

@@ -10,6 +10,11 @@ const NEAR = [
   ]),
 ];
 
+// Half the size of a tile over the distance of two, and colours of rough ground and of its tiles.
+const TILE = 0.1,
+  LIGHT = [0.72, 0.3],
+  DARK = [0.07, 0.16];
+
 // Share of the picture within which spots are drawn.
 const EDGE = 0.94;
 
@@ -25,6 +30,7 @@ export class View {
     this.camera = this.scene.getCamera();
     this.Vector = this.camera.position.constructor;
     this.offset = null;
+    this.dark = matchMedia("(prefers-color-scheme: dark)").matches;
     this.setFloor();
   }
 
@@ -33,10 +39,9 @@ export class View {
     const { scene, facts, floor, camera } = this,
       { shadow } = scene,
       reach = facts.extent;
-    const dark = matchMedia("(prefers-color-scheme: dark)").matches;
     floor.traverse(part => {
       part.layers.set(1);
-      if (dark && !facts.water) part.material?.color.setScalar(0.12);
+      if (this.dark && !facts.water) part.material?.color.setScalar(0.12);
     });
     camera.layers.enable(1);
     scene.boundingBox.min.set(-reach, 0, -reach);
@@ -45,6 +50,50 @@ export class View {
     shadow.setScene(scene, scene.shadowSoftness, "bottom");
     this.ground.add(shadow);
     shadow.visible = !facts.water;
+  }
+
+  // Show rough ground in place of the tiles, or the tiles again.
+  showGround(ground) {
+    this.floor.visible = !ground.size;
+    if (this.rough) this.rough.visible = ground.size > 0;
+    if (!ground.size || this.shown === ground.version) return;
+    this.shown = ground.version;
+    this.rough ??= this.surface(ground.count);
+    const { position, color } = this.rough.geometry.attributes,
+      points = ground.points(),
+      looks = this.dark ? DARK : LIGHT,
+      { apart } = this.facts,
+      far = value => Math.abs(value - apart * Math.round(value / apart));
+    points.forEach(([x, y, z], n) => {
+      const tile = ground.along(x, y).every(value => far(value) < TILE * apart);
+      position.setXYZ(n, x, y, z);
+      color.setXYZ(n, ...Array(3).fill(looks[Number(tile)]));
+    });
+    position.needsUpdate = color.needsUpdate = true;
+    this.rough.geometry.computeVertexNormals();
+  }
+
+  // A surface of `count` by `count` points in MuJoCo's axes, of the viewer's own classes.
+  surface(count) {
+    let tiles = null;
+    this.floor.traverse(part => (tiles = part.isMesh ? part : tiles));
+    const { geometry, material } = tiles,
+      Attribute = geometry.attributes.position.constructor,
+      made = new geometry.constructor(),
+      mesh = new tiles.constructor(made, material.clone()),
+      faces = [];
+    for (let row = 0; row + 1 < count; row++)
+      for (let n = row * count; n + 1 < (row + 1) * count; n++)
+        faces.push(n, n + 1, n + count, n + 1, n + count + 1, n + count);
+    for (const name of ["position", "color"])
+      made.setAttribute(name, new Attribute(new Float32Array(3 * count ** 2), 3));
+    made.setIndex(new Attribute(new Uint32Array(faces), 1));
+    mesh.material.color.setScalar(1);
+    Object.assign(mesh.material, { vertexColors: true, needsUpdate: true });
+    mesh.layers.set(1);
+    mesh.frustumCulled = false;
+    this.world.add(mesh);
+    return mesh;
   }
 
   // Draw the present state. follow: whether the camera goes along. seconds: since the last drawing.
@@ -66,12 +115,15 @@ export class View {
     // The floor's pattern stays where it is in the world; its patch goes along with the creature.
     const tile = value => this.facts.apart * Math.round(value / this.facts.apart);
     this.floor.position.set(...here.toArray().map(tile)).add(this.world.position);
+    if (simulation.ground) this.showGround(simulation.ground);
     // The ground is level where gravity says; in water there is none.
     const down = this.vector(...model.opt.gravity).applyQuaternion(axes).normalize();
     if (!water) this.ground.quaternion.setFromUnitVectors(down, this.vector(0, -1, 0));
     const { shadow } = this.scene,
       beside = here.add(this.world.position);
-    shadow.position.set(beside.x, 0, beside.z);
+    // A flat shadow: no hill below the creature hides it.
+    const floors = this.bodies.map(([body]) => simulation.floorAt(data.xpos.slice(3 * body)));
+    shadow.position.set(beside.x, Math.max(...floors), beside.z);
     shadow.needsUpdate = true;
     this.scene.queueRender();
   }
