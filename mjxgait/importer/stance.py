@@ -28,6 +28,14 @@ SEARCHES = tuple(map(Sampling, (0.4, 1.0, 1.6)))
 CAREFUL = tuple(Sampling(1.6, 6, beside) for beside in (150.0, 400.0, 400.0))
 """Searches for a body that falls off its two feet: a heavy head needs them beneath its weight."""
 FIRST, SAMPLES, ROUNDS = 400, 40, 25
+AT_ITS_END = 0.05
+"""rad from an end of its range within which a joint rests on it."""
+LATERAL = 0.7
+"""Least share of a hinge's axis along y, of those that swing or bend a leg."""
+BENDS, CROUCHES = np.array([-1.0, 2.0, -1.0]), np.linspace(0.1, 0.4, 16)
+"""Turns of hip, knee and ankle of a crouch, in units of half the knee's bend; these halves, rad."""
+BENT, UPRIGHT = (0.75, 0.94), (0.975, 0.985)
+"""Straightness of a leg without a cost, and that of a figure with arms."""
 MARGIN = 0.25
 """rad that a joint should keep from its limit."""
 NEUTRAL = 0.9
@@ -147,6 +155,7 @@ class Search:
             self.segments = [s for s in self.segments if not set(s) & above]
         self.flat, self.ups = list(lying), list(lying.values())
         self.legs = [kinematics.leg(f) for f in range(len(kinematics.feet))]
+        self.upright = bool(kinematics.arms.any())
 
     def _straightest(self) -> np.ndarray:
         """Pose [J] with all joints as near to 0 as their limits allow."""
@@ -183,7 +192,7 @@ class Search:
             )
             poses = [
                 symmetric(np.clip(q, self.kinematics.low, self.kinematics.high), self.mirror)
-                for q in drawn
+                for q in ([*drawn, *self._crouched()] if i == 0 else drawn)
             ]
             costs = np.array([self.cost(q, beside) for q in poses])
             order = costs.argsort()[: sampling.elite]
@@ -192,6 +201,38 @@ class Search:
             elite = np.array([poses[i] for i in order])
             mean, width = elite.mean(0), (elite.std(0) + 1e-3) * free
         return best
+
+    def _crouched(self) -> list[np.ndarray]:
+        """Poses [J] of a figure with bent knees, feet as level as before and beneath the hips.
+
+        Random draws seldom bend hip, knee and ankle together.
+        """
+        if not self.upright:
+            return []
+        self.kinematics.pose(self.start)
+        ways = np.zeros_like(self.start)
+        for leg in self.legs:
+            bending = self._lateral(leg)
+            if len(bending) != len(BENDS):
+                return []
+            along = np.sign(self.kinematics.data.xaxis[1:, 1][bending])
+            knee = bending[1]
+            room = (
+                (self.kinematics.high - self.start)[knee],
+                (self.start - self.kinematics.low)[knee],
+            )
+            ways[bending] = BENDS * along * along[1] * (1 if room[0] > room[1] else -1)
+        return [self.start + bend * ways for bend in CROUCHES]
+
+    def _lateral(self, leg: list[int]) -> list[int]:
+        """Hinges of a leg about the y axis in the latest pose."""
+        return [j for j in leg if abs(self.kinematics.data.xaxis[j + 1][1]) > LATERAL]
+
+    def at_ends(self, q: np.ndarray) -> bool:
+        """Whether a hinge of a leg about the y axis is at an end of its range in a pose [J]."""
+        self.kinematics.pose(q)
+        room = np.minimum(q - self.kinematics.low, self.kinematics.high - q)
+        return bool((room[[j for leg in self.legs for j in self._lateral(leg)]] < AT_ITS_END).any())
 
     def stretch(self, q: np.ndarray) -> float:
         """Mean straightness of the legs in a pose [J]."""
@@ -252,6 +293,7 @@ class Search:
         feet before or behind them (squared); lengths in hip heights.
         """
         stretched = beneath = narrow = ahead = 0.0
+        least, most = UPRIGHT if self.upright else BENT
         for middle, leg in zip(middles, self.legs, strict=True):
             anchors = self.kinematics.data.xanchor[[j + 1 for j in leg]]
             path = np.concatenate([anchors, middle[None]])
@@ -261,5 +303,5 @@ class Search:
             side = float(anchors[np.abs(anchors[:, 1]).argmax(), 1])
             narrow += max(abs(side) - float(middle[1]) * np.sign(side), 0.0) / self.hip
             ratio = straightness(path)
-            stretched += max(ratio - 0.94, 0.0) + max(0.75 - ratio, 0.0)
+            stretched += max(ratio - most, 0.0) + max(least - ratio, 0.0)
         return stretched, beneath, narrow, ahead

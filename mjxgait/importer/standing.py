@@ -16,6 +16,7 @@ from mjxgait.importer.soles import guard_parts, lay_soles
 from mjxgait.importer.source import Source
 from mjxgait.importer.spec import tidy
 from mjxgait.importer.stance import (
+    AT_ITS_END,
     CAREFUL,
     SEARCHES,
     Sampling,
@@ -32,14 +33,13 @@ TOUCH, GIVE = 0.35, 0.01
 """
 SINK = 0.0005
 """m, initial depth of the feet in the floor, about as deep as they rest."""
-FOLDED, STRAIGHT = 0.4, 0.97
-"""Straightness below which legs count as folded up, and from which as straight."""
+FOLDED, STRAIGHT, STRAIGHTER = 0.4, 0.97, 0.99
+"""Straightness below which legs count as folded up, and from which as straight; a figure's."""
+STEADY = 0.97
+"""Uprightness after 2 s with which a figure with arms stands steadily; else others are tried."""
 STRONGER = (2.0, 4.0)
 """Factors of strength for a body that sinks, tried in this order."""
 SEARCHED = "a search over leg bends"
-AT_ITS_END = 0.05
-"""rad from an end of its range within which a joint rests on it."""
-
 Pose = Callable[[], np.ndarray]
 """Computes a pose [J]."""
 
@@ -119,13 +119,16 @@ def standing(
     poses = [(what, lambda q=q: q) for what, q in offered] + searched(SEARCHES, 0)
     attempt = functools.partial(_try, kinematics, planar, notes)
     found = _best_pose(search, poses, functools.partial(attempt, 1.0))
-    if len(kinematics.feet) == 2 and not (found[1].held.stands or found[1].held.sinks):
+    falls = len(kinematics.feet) == 2 and not (found[1].held.stands or found[1].held.sinks)
+    if falls or (search.upright and not _can_step(search, found[1].q)):
         careful = searched(CAREFUL, len(SEARCHES))
-        found = _better(found, _best_pose(search, careful, functools.partial(attempt, 1.0)))
+        found = _better(search, found, _best_pose(search, careful, functools.partial(attempt, 1.0)))
     for stronger in STRONGER:
         if not found[1].held.sinks:
             break
-        found = _better(found, _best_pose(search, poses, functools.partial(attempt, stronger)))
+        found = _better(
+            search, found, _best_pose(search, poses, functools.partial(attempt, stronger))
+        )
     what, best = found
     held = best.held
     notes.changes, notes.guesses = best.notes.changes, best.notes.guesses
@@ -147,8 +150,10 @@ def standing(
     return best
 
 
-def _better(one: tuple[str, Candidate], other: tuple[str, Candidate]) -> tuple[str, Candidate]:
-    return max(one, other, key=lambda pair: pair[1].held.score)
+def _better(
+    search: Search, one: tuple[str, Candidate], other: tuple[str, Candidate]
+) -> tuple[str, Candidate]:
+    return max(one, other, key=lambda pair: _score(search, pair[1]))
 
 
 def _best_pose(
@@ -160,19 +165,26 @@ def _best_pose(
     tried: list[tuple[str, Candidate]] = []
     for what, pose in poses:
         tried.append((what, attempt(pose())))
-        if tried[-1][1].held.stands and _can_step(search, tried[-1][1].q):
+        held, able = tried[-1][1].held, _can_step(search, tried[-1][1].q)
+        if held.stands and able and (held.up > STEADY or not search.upright):
             break
-    return max(
-        tried, key=lambda pair: pair[1].held.score - 0.2 * (not _can_step(search, pair[1].q))
-    )
+    return max(tried, key=lambda pair: _score(search, pair[1]))
+
+
+def _score(search: Search, candidate: Candidate) -> float:
+    """Score of the stand test, less a little for legs that cannot step."""
+    return candidate.held.score - 0.2 * (not _can_step(search, candidate.q))
 
 
 def _can_step(search: Search, q: np.ndarray) -> bool:
     """Return whether the legs are neither straight nor folded up in a pose [J].
 
     Straight ones have no length left to step with, and folded ones do not swing. Such a pose is
-    only the second choice.
+    only the second choice. A figure's knee at its end is as good as straight: half of the poses near it
+    are out of its range.
     """
+    if search.upright:
+        return FOLDED < search.stretch(q) < STRAIGHTER and not search.at_ends(q)
     return FOLDED < search.stretch(q) < STRAIGHT
 
 
