@@ -122,13 +122,11 @@ def standing(
     falls = len(kinematics.feet) == 2 and not (found[1].held.stands or found[1].held.sinks)
     if falls or (search.upright and not _can_step(search, found[1].q)):
         careful = searched(CAREFUL, len(SEARCHES))
-        found = _better(search, found, _best_pose(search, careful, functools.partial(attempt, 1.0)))
+        found = _best_pose(search, careful, functools.partial(attempt, 1.0), found)
     for stronger in STRONGER:
         if not found[1].held.sinks:
             break
-        found = _better(
-            search, found, _best_pose(search, poses, functools.partial(attempt, stronger))
-        )
+        found = _best_pose(search, poses, functools.partial(attempt, stronger), found)
     what, best = found
     held = best.held
     notes.changes, notes.guesses = best.notes.changes, best.notes.guesses
@@ -150,42 +148,39 @@ def standing(
     return best
 
 
-def _better(
-    search: Search, one: tuple[str, Candidate], other: tuple[str, Candidate]
-) -> tuple[str, Candidate]:
-    return max(one, other, key=lambda pair: _score(search, pair[1]))
-
-
 def _best_pose(
     search: Search,
     poses: Sequence[tuple[str, Pose]],
     attempt: Callable[[np.ndarray], Candidate],
+    *before: tuple[str, Candidate],
 ) -> tuple[str, Candidate]:
-    """Return a pose with its description; see `standing`. attempt: runs the stand test."""
+    """Return a pose with its description; see `standing`.
+
+    attempt: runs the stand test. before: poses that were tried.
+    """
     tried: list[tuple[str, Candidate]] = []
     for what, pose in poses:
         tried.append((what, attempt(pose())))
         held, able = tried[-1][1].held, _can_step(search, tried[-1][1].q)
         if held.stands and able and (held.up > STEADY or not search.upright):
             break
-    return max(tried, key=lambda pair: _score(search, pair[1]))
-
-
-def _score(search: Search, candidate: Candidate) -> float:
-    """Score of the stand test, less a little for legs that cannot step."""
-    return candidate.held.score - 0.2 * (not _can_step(search, candidate.q))
+    return max(
+        [*before, *tried],
+        key=lambda pair: pair[1].held.score - 0.2 * (not _can_step(search, pair[1].q)),
+    )
 
 
 def _can_step(search: Search, q: np.ndarray) -> bool:
     """Return whether the legs are neither straight nor folded up in a pose [J].
 
     Straight ones have no length left to step with, and folded ones do not swing. Such a pose is
-    only the second choice. A figure's knee at its end is as good as straight: half of the poses near it
-    are out of its range.
+    only the second choice. A figure's knee at its end is as good as straight: half of the poses
+    near it are out of its range.
     """
-    if search.upright:
-        return FOLDED < search.stretch(q) < STRAIGHTER and not search.at_ends(q)
-    return FOLDED < search.stretch(q) < STRAIGHT
+    straight = STRAIGHTER if search.upright else STRAIGHT
+    if search.upright and search.at_ends(q):
+        return False
+    return FOLDED < search.stretch(q) < straight
 
 
 def _try(
