@@ -197,7 +197,7 @@ def _draw(folder: Path, screen: "Screen", subject: str, all_plots: bool) -> bool
             screen.say(f"Drawing {folder / PLOTS}/; the run itself is done and safe.")
             from mjxgait.rendering.plots import plot_run
 
-            plot_run(folder)
+            plot_run(folder, formats=("png",))
     except KeyboardInterrupt:
         screen.say(f"Not all is drawn; {command('plot', folder, run=folder)} draws it.")
         return False
