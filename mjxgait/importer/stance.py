@@ -34,7 +34,7 @@ LATERAL = 0.7
 """Least share of a hinge's axis along y, of those that swing or bend a leg."""
 BENDS, CROUCHES = np.array([-1.0, 2.0, -1.0]), np.linspace(0.1, 0.4, 16)
 """Turns of hip, knee and ankle of a crouch, in units of half the knee's bend; these halves, rad."""
-BENT, UPRIGHT = (0.75, 0.94), (0.975, 0.985)
+BENT, UPRIGHT = (0.75, 0.94), (0.965, 0.975)
 """Straightness of a leg without a cost, and that of a figure with arms."""
 MARGIN = 0.25
 """rad that a joint should keep from its limit."""
