@@ -363,7 +363,7 @@ def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
 def test_next_steps_are_printed_before_plots_that_may_be_interrupted(
     tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ):
-    def interrupted(run: Path):
+    def interrupted(run: Path, formats: tuple[str, ...]):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("mjxgait.cli.training.evolve", lambda *given: given[-2]() is None)
