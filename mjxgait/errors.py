@@ -64,6 +64,11 @@ def matches(name: str, patterns: Iterable[str]) -> bool:
     return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
+def clause(sentence: str) -> str:
+    """Return a sentence as a part of another: with a small letter, and without its full stop."""
+    return sentence[0].lower() + sentence[1:].rstrip(".")
+
+
 def listed(names: Sequence[str], most: int = 6) -> str:
     """Return `a, b, c` or `a, b, c and 7 more`."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

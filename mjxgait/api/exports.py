@@ -196,8 +196,8 @@ def _by_itself(
         except UserError as error:
             notes = [f"{out}: shows the body of capsules, because {error}"]
         else:
-            whose = f"on your character {own.file}; --onto {CAPSULES} writes the body of capsules"
-            return said, [f"{out}: {whose}", *([own.note] if own.note else [])]
+            where = f"on your character {own.file}; --onto {CAPSULES} writes the body of capsules"
+            return said, [f"{out}: {where}", *([own.note] if own.note else [])]
     return _animation(loop, None, out, travelling), notes
 
 

@@ -161,6 +161,11 @@ class Anatomy:
     lowered: bool = False
     swinging: Sequence[int] = ()
 
+    def turn(self, data: mujoco.MjData) -> np.ndarray:
+        """Rotation [3, 3] from the world of the file, in a pose of it, to that of the anatomy."""
+        found: np.ndarray = self.xrot[self.root] @ data.xmat[self.root].reshape(3, 3).T
+        return found
+
     def low(self, bodies: Sequence[int]) -> float:
         """Lowest point in m of some bodies; the lowest body frame where they have no shapes."""
         heights = []

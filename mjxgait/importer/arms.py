@@ -27,8 +27,8 @@ BEND, TURN = 0.05, 0.003
 TILTS = np.radians([0.0, 8.0, 16.0, 24.0, 32.0, 40.0])
 """Angles from the vertical, outwards, at which an arm hangs, tried until it is clear of the rest."""
 CLEAR, UPPER = 0.01, 0.3
-"""Least distance of an arm from the rest, in shoulder heights; share of its length, from the shoulder on,
-that may touch."""
+"""Least distance of an arm from the rest, in shoulder heights; share of its length, from the
+shoulder on, that may touch."""
 SIDEWAYS = 0.3
 """Most share of a shoulder's motion that is not ahead or back."""
 FAST = 1.2
@@ -104,41 +104,56 @@ def _chain(model: mujoco.MjModel, body: int, movable: Sequence[int]) -> tuple[in
 def hung(model: mujoco.MjModel, anatomy: Anatomy, arms: Sequence[Arm]) -> np.ndarray:
     """Return the pose [nq] of the anatomy with arms that hang, clear of trunk and legs."""
     data = posed(model, anatomy.qpos)
-    turn = anatomy.xrot[anatomy.root] @ data.xmat[anatomy.root].reshape(3, 3).T
-    near = (
-        CLEAR * (anatomy.xpos[arms[0].bodies[0]][2] - anatomy.low(anatomy.bodies)) / anatomy.scale
-    )
+    turn = anatomy.turn(data)
+    high = anatomy.xpos[arms[0].bodies[0]][2] - anatomy.low(anatomy.bodies)
     for arm in arms:
         adr = model.jnt_qposadr[list(arm.hinges)]
         start = data.qpos[adr].copy()
-        low, high = limits_around(model, list(arm.hinges), start)
-        away = np.linalg.norm(data.xpos[list(arm.bodies)] - data.xpos[arm.bodies[0]], axis=1)
-        far = dict(zip(arm.bodies, away / away.max(), strict=True))
-        below = np.array([far[int(model.jnt_bodyid[j])] > UPPER for j in arm.hinges])
-        stiff = np.where(below, BEND, TURN)
         for tilt in TILTS:
             down = turn.T @ (np.sin(tilt) * arm.side - np.cos(tilt) * np.array([0.0, 0.0, 1.0]))
-
-            def height(
-                q: np.ndarray,
-                arm: Arm = arm,
-                adr: np.ndarray = adr,
-                start: np.ndarray = start,
-                stiff: np.ndarray = stiff,
-                length: float = away.max(),
-                down: np.ndarray = down,
-            ) -> float:
-                data.qpos[adr] = q
-                mujoco.mj_kinematics(model, data)
-                mujoco.mj_comPos(model, data)
-                hangs = (data.subtree_com[arm.bodies[0]] - data.xpos[arm.bodies[0]]) @ down
-                return float(stiff @ np.square(q - start) - hangs / length)
-
-            data.qpos[adr] = descended(height, start, low, high)
+            data.qpos[adr] = _lowest(model, data, arm, down, start)
             mujoco.mj_kinematics(model, data)
-            if _clear(model, data, anatomy, arm, near):
+            if _clear(model, data, anatomy, arm, CLEAR * high / anatomy.scale):
                 break
     found: np.ndarray = data.qpos.copy()
+    return found
+
+
+def _lowest(
+    model: mujoco.MjModel, data: mujoco.MjData, arm: Arm, down: np.ndarray, start: np.ndarray
+) -> np.ndarray:
+    """Return the angles [J] of an arm's hinges that let it hang.
+
+    data: is changed. down: [3] unit vector in the file's world. start: [J] angles at which its
+    elbow would rest.
+    """
+    adr, shoulder = model.jnt_qposadr[list(arm.hinges)], arm.bodies[0]
+    data.qpos[adr] = start
+    mujoco.mj_kinematics(model, data)
+    away = _away(data, arm)
+    below = [away[arm.bodies.index(int(model.jnt_bodyid[j]))] > UPPER for j in arm.hinges]
+    stiff, length = np.where(below, BEND, TURN), _length(data, arm)
+
+    def height(q: np.ndarray) -> float:
+        data.qpos[adr] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        hangs = (data.subtree_com[shoulder] - data.xpos[shoulder]) @ down
+        return float(stiff @ np.square(q - start) - hangs / length)
+
+    return descended(height, start, *limits_around(model, list(arm.hinges), start))
+
+
+def _length(data: mujoco.MjData, arm: Arm) -> float:
+    """Greatest distance of a body of an arm from the shoulder, in the file's unit."""
+    places = data.xpos[list(arm.bodies)]
+    return float(np.linalg.norm(places - places[0], axis=1).max())
+
+
+def _away(data: mujoco.MjData, arm: Arm) -> np.ndarray:
+    """Distance of each body of an arm [bodies] from the shoulder, over the greatest."""
+    places = data.xpos[list(arm.bodies)]
+    found: np.ndarray = np.linalg.norm(places - places[0], axis=1) / _length(data, arm)
     return found
 
 
@@ -146,8 +161,7 @@ def _clear(
     model: mujoco.MjModel, data: mujoco.MjData, anatomy: Anatomy, arm: Arm, near: float
 ) -> bool:
     """Return whether the arm's shapes keep a distance from those of the other parts."""
-    away = np.linalg.norm(data.xpos[list(arm.bodies)] - data.xpos[arm.bodies[0]], axis=1)
-    lower = {b for b, far in zip(arm.bodies, away, strict=True) if far > UPPER * away.max()}
+    lower = {b for b, far in zip(arm.bodies, _away(data, arm), strict=True) if far > UPPER}
     others = set(anatomy.bodies) - set(arm.bodies)
     body = model.geom_bodyid
     own = [g for g in range(model.ngeom) if int(body[g]) in lower]
@@ -167,7 +181,7 @@ def shoulder_of(
     """
     data = posed(model, qpos)
     mujoco.mj_comPos(model, data)
-    turn = anatomy.xrot[anatomy.root] @ data.xmat[anatomy.root].reshape(3, 3).T
+    turn = anatomy.turn(data)
     along = turn @ (data.subtree_com[arm.bodies[0]] - data.xpos[arm.bodies[0]])
     first = arm.hinges[:SHOULDER]
     for count in range(1, len(first) + 1):

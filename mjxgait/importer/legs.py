@@ -137,7 +137,7 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
     Used for files with folded or stretched legs in their zero pose.
     """
     data, rng = posed(model, anatomy.qpos), np.random.default_rng(0)
-    up = anatomy.xrot[anatomy.root] @ data.xmat[anatomy.root].reshape(3, 3).T
+    up = anatomy.turn(data)
     movers = {int(model.jnt_bodyid[j]) for j in movable}
     for end in _ends(model, movers):
         joints = [

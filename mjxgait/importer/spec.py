@@ -76,7 +76,7 @@ def place_bodies(model: mujoco.MjModel, anatomy: Anatomy) -> None:
             data.qpos[a : a + width] = model.qpos0[a : a + width]
     mujoco.mj_kinematics(model, data)
     xrot = data.xmat.reshape(-1, 3, 3)
-    turn = anatomy.xrot[anatomy.root] @ xrot[anatomy.root].T
+    turn = anatomy.turn(data)
     for body, b in zip(anatomy.spec.bodies[1:], anatomy.bodies, strict=True):
         above = int(model.body_parentid[b])
         if b == anatomy.root:

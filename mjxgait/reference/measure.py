@@ -301,3 +301,10 @@ def _unevenness(frames: np.ndarray) -> float:
     """Return the standard deviation of the times between footfalls over their mean."""
     between = np.diff(frames)
     return float(between.std() / between.mean())
+
+
+def spells(holds: np.ndarray) -> list[tuple[int, int]]:
+    """Return the first frame of each spell in which something [T] holds, and the one after it."""
+    edges = np.diff(np.concatenate([[0], holds.astype(int), [0]]))
+    begins, ends = np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist()
+    return list(zip(begins, ends, strict=True))

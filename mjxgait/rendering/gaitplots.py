@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from mjxgait.reference.measure import spells
 from mjxgait.rendering.curves import ACCENT, DARK, MIDDLE, Figures, titled
 from mjxgait.rendering.walk import WARMUP, Walk
 
@@ -56,10 +57,7 @@ def draw_footfalls(axes: Axes, walk: Walk) -> None:
     names = walk.creature.feet.names
     share = contact.mean(0)
     for row, foot in enumerate(contact.T):
-        padded = np.diff(np.concatenate([[0], foot.astype(int), [0]]))
-        for begin, end in zip(
-            np.flatnonzero(padded == 1), np.flatnonzero(padded == -1), strict=True
-        ):
+        for begin, end in spells(foot):
             axes.add_patch(
                 Rectangle(
                     (begin * step, row - ROW),

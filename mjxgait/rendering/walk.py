@@ -19,7 +19,7 @@ from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.controllers.sims_brain.reference_body import THEIRS, grow, opponent_genome
 from mjxgait.creature import Creature
-from mjxgait.errors import UserError
+from mjxgait.errors import UserError, clause
 from mjxgait.reference.layout import RADIUS, Ground, StartFrame, start_frame
 from mjxgait.reference.measure import Recording, measure, stride_starts
 from mjxgait.reference.outcome import Trajectory
@@ -299,7 +299,7 @@ def doubt(run: Path, walk: Walk) -> str:
     if document is None:
         reasons.append(f"it has not been examined, which {command('certify', run, run=run)} does")
     elif old := outdated(document, walk.champion, walk.creature):
-        reasons.append(old[0].lower() + old[1:].rstrip("."))
+        reasons.append(clause(old))
     elif (verdict := verdict_of(document)).certified:
         return ""
     elif failed := verdict.failed:

@@ -18,6 +18,7 @@ from mjxgait.certification.advice import ADVICE
 from mjxgait.certification.verdict import Document
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
+from mjxgait.errors import clause
 from mjxgait.training.folder import CERTIFICATE, STRESS
 
 CHECK = (
@@ -44,8 +45,7 @@ def certificate_summary(
     if document is None:
         return _uncertified([*falls, "it has not been examined"], "Examine it")
     if reason := outdated(document, champion, creature):
-        reason = reason[0].lower() + reason[1:].rstrip(".")
-        return _uncertified([*falls, reason], "Examine it again")
+        return _uncertified([*falls, clause(reason)], "Examine it again")
     verdict = verdict_of(document)
     measures = [(c.skill, m) for c in criteria_of(document) for m in c.measures]
     nearest = sorted(measures, key=lambda pair: pair[1].margin)[:TIGHTEST]

@@ -1,7 +1,7 @@
 """The best individuals of a run that may still learn, simulated one by one, side by side in a scene.
 
-The champion is the best of the latest generation, the others those of the latest checkpoint: a
-training is not asked for anything more than it writes anyway.
+The champion is the best of the latest generation, the others those of the latest checkpoint, so a
+training writes nothing more for them.
 """
 
 import contextlib

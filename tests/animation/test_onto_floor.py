@@ -1,4 +1,4 @@
-"""A walk on a character whose skin is no capsule: its feet are on the floor, by their vertices."""
+"""A walk on a character with a skin that is no capsule: its feet are on the floor, by vertices."""
 
 import dataclasses
 from collections.abc import Mapping

@@ -28,7 +28,7 @@ HALF = float(np.sqrt(0.5))
 
 
 def lowered(bones: Mapping[str, Bone], degrees: float = 45.0) -> dict[str, Bone]:
-    """A figure with spread arms whose arms point down by so many degrees: an A-pose."""
+    """A figure with spread arms that point down by so many degrees: an A-pose."""
     low = np.radians(degrees)
 
     def at(place: tuple[float, float, float]) -> tuple[float, float, float]:

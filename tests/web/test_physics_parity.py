@@ -48,7 +48,7 @@ by 1e-12 after 2.5 s, 1e-10 after 4.9 s and 6e-10 after 5 s; two brains at a cub
 CALM = 0.8
 """s in which all motions agree within `TOLERANCE`."""
 ROUGH_TOLERANCE = 1e-5
-"""m or rad in 5 s on rough ground, whose heights are float32 numbers of another scale. Measured:
+"""m or rad in 5 s on rough ground, with heights in float32 of another scale. Measured:
 4e-7 for an evolved walk on round feet. Blocks cannot be compared: contacts of a box with a height
 field jump, such that heights that differ by 1e-9 m move a body of blocks by 1 cm after 0.3 s, also
 in the examiner alone.

@@ -100,7 +100,7 @@ func _physics_process(delta: float):
 	_move(delta)
 
 
-# Takes the blend towards what is asked for, or begins a start or stop.
+# Takes the blend towards the wanted one, or begins a start or stop.
 func _approach(delta: float):
 	var target = repertoire.nearest(turn, speed)
 	if by_ways and repertoire.ways:

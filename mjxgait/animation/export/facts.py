@@ -23,7 +23,7 @@ UNEXAMINED = "not examined"
 def facts_of(loop: WalkLoop, travelling: bool, units: float = 1.0) -> dict[str, object]:
     """The facts of a loop that files state. units: of the file, per m.
 
-    A motion whose root moves unevenly states its way instead of a speed.
+    A motion with a root that moves unevenly states its way instead of a speed.
     """
     facts: dict[str, object] = {
         "strides": loop.strides,

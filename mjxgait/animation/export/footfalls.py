@@ -10,6 +10,7 @@ import numpy as np
 from scipy.ndimage import binary_closing, binary_opening
 
 from mjxgait.animation.export.loop import WalkLoop
+from mjxgait.reference.measure import spells
 
 BRIEF = 0.03
 """Seconds; a foot that leaves the floor, or touches it, for less than that does not step."""
@@ -63,9 +64,7 @@ def stances(carries: np.ndarray, brief: int) -> list[tuple[int, int]]:
     seam is counted on from its beginning.
     """
     count = len(carries)
-    # Three rounds, of which the middle one has both its neighbours.
-    thrice = binary_closing(np.tile(carries, 3), np.ones(brief))
-    down = binary_opening(thrice, np.ones(brief))[count : 2 * count]
+    down = _lasting(np.tile(carries, 3), brief, count)
     if down.all():
         return [(0, count)]
     begins = np.flatnonzero(down & ~np.roll(down, 1))
@@ -76,8 +75,14 @@ def stances(carries: np.ndarray, brief: int) -> list[tuple[int, int]]:
 
 def stances_once(carries: np.ndarray, brief: int) -> list[tuple[int, int]]:
     """Return the same of a motion [T] that does not repeat: its last stance ends with it."""
-    widened = binary_closing(np.pad(carries, 2 * brief, mode="edge"), np.ones(brief))
-    down = binary_opening(widened, np.ones(brief))[2 * brief : -2 * brief]
-    edges = np.diff(np.concatenate([[False], down, [False]]).astype(int))
-    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
-    return [(int(begin), int(end)) for begin, end in zip(begins, ends, strict=True)]
+    return spells(_lasting(np.pad(carries, 2 * brief, mode="edge"), brief, 2 * brief))
+
+
+def _lasting(wide: np.ndarray, brief: int, margin: int) -> np.ndarray:
+    """Whether a foot is down, without brief gaps and stances, [T].
+
+    wide: with so many frames of its neighbours at both ends.
+    """
+    closed = binary_closing(wide, np.ones(brief))
+    down: np.ndarray = binary_opening(closed, np.ones(brief))[margin:-margin]
+    return down

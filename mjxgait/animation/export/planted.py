@@ -112,7 +112,7 @@ def _middle(gaps: np.ndarray, down: np.ndarray) -> float:
 
 
 def _legs(creature: Creature, character: Character, bones: Bones) -> list[Leg]:
-    """The legs whose feet have skin."""
+    """The legs with skin at their feet."""
     model, feet = creature.model, creature.feet
     chains, tops, nodes = [], [], []
     moves = {node for part, node in bones.items() if model.body(part).jntnum[0]}
