@@ -31,7 +31,7 @@ def remembers(body, champion):
 
 @functools.cache
 def with_a_brain(task):
-    """The first of a first population that the light and a neuron with a memory move, and its body."""
+    """The first of a first population moved by the light and a neuron with memory, and its body."""
     table = {
         "use": {"controller": "brain", "task": task},
         "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 3, "central": 2},
@@ -55,8 +55,8 @@ def with_a_brain(task):
 
 
 def examined(creature, champion, seconds, disturbed, push, light=None):
-    """The same by the examiner: poses [T, nq], targets or for brains torques [T, J], and s until the
-    fall or infinity.
+    """The same by the examiner: poses [T, nq], targets or for brains torques [T, J], and s until
+    the fall or infinity.
     """
     task = how_simulated(champion.task, champion.wish)
     plain = task.aimed(nominal_starts(creature, 1), CertificateConfig())

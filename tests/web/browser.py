@@ -36,9 +36,13 @@ def launch(playwright):
     return playwright.chromium.launch(executable_path=program, args=SOFTWARE_GL)
 
 
+COARSE = {"device_scale_factor": 0.5}
+"""A quarter of the pixels in the same layout: software GL takes more than a core for all of them."""
+
+
 def new_tab(browser, width, height, **settings):
     """An empty tab, in which a page of the viewer is drawn soon."""
-    tab = browser.new_page(viewport={"width": width, "height": height}, **settings)
+    tab = browser.new_page(viewport={"width": width, "height": height}, **COARSE | settings)
     tab.add_init_script(FEWER_SAMPLES)
     return tab
 
@@ -78,14 +82,12 @@ def lightness(tab):
     return [np.mean([int(part) for part in re.findall(r"\d+", text)[:3]]) / 255 for text in colours]
 
 
-def check_dark(browser, address):
-    """Check that a page is dark with light text where the user wants that, and light elsewhere."""
-    for scheme, dark in (("light", False), ("dark", True)):
-        tab, wrong, _ = watched_tab(browser, address, color_scheme=scheme)
+def check_dark(tab):
+    """Check a page that was loaded dark: its text is light, and it is light where that is wanted."""
+    for scheme, dark in (("dark", True), ("light", False)):
+        tab.emulate_media(color_scheme=scheme)
         paper, ink = lightness(tab)
         assert (paper < 0.2, ink > 0.7) == (dark, dark), scheme
-        assert wrong == []
-        tab.close()
 
 
 def canvas(tab):

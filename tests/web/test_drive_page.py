@@ -1,4 +1,4 @@
-"""Looks of the page that drives a repertoire; its motion: tests/experiments/repertoire/test_driven.py."""
+"""Looks of the page that drives a repertoire; its motion is tested in `repertoire/test_driven.py`."""
 
 from experiments.repertoire.made_up import begin, examine
 from web.browser import check_dark, wait_until, watched_tab
@@ -10,9 +10,10 @@ def test_the_page_is_dark_where_the_user_wants_that(browser, tmp_path):
     made, page = begin(tmp_path / "set"), tmp_path / "drive.html"
     examine(*made)
     write_driven(made[0], page)
-    check_dark(browser, page.as_uri())
-    tab, _, _ = watched_tab(browser, page.as_uri(), color_scheme="dark")
+    tab, wrong, _ = watched_tab(browser, page.as_uri(), color_scheme="dark")
     wait_until(tab, "document.querySelector('circle.used')")
     used = "getComputedStyle(document.querySelector('circle.used')).fill"
     assert tab.evaluate(used) == "rgb(232, 234, 237)"
+    check_dark(tab)
+    assert wrong == []
     tab.close()

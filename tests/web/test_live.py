@@ -114,7 +114,10 @@ def test_the_page_is_dark_where_the_user_wants_that(browser, site, run, stool):
     watcher, address = site
     improve(run, stool, treading(stool))
     watcher.look()
-    check_dark(browser, address)
+    tab, wrong, _ = watched_tab(browser, address, color_scheme="dark")
+    check_dark(tab)
+    assert wrong == []
+    tab.close()
 
 
 def test_a_run_that_is_not_trained_is_shown_at_once(tmp_path):

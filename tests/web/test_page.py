@@ -168,22 +168,27 @@ def pressed(tab):
     return tab.locator('.view[aria-pressed="true"]').all_inner_texts()
 
 
-def test_the_page_fits_a_phone_and_speaks_of_fingers(browser, page):
+def test_the_page_fits_a_phone_and_speaks_of_fingers(browser, page, opened):
     tab = new_tab(browser, 390, 844, **PHONE)
     tab.goto(page.as_uri())
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
     assert "pinch" in tab.inner_text("body")
     assert "scroll" not in tab.inner_text("body")
     tab.close()
-    tab = new_tab(browser, 390, 844)
-    tab.goto(page.as_uri())
+    # A window as narrow, without a touch screen.
+    tab, _, _ = opened
+    wide = tab.viewport_size
+    tab.set_viewport_size({"width": 390, "height": 844})
     assert "scroll" in tab.inner_text("body")
     assert "pinch" not in tab.inner_text("body")
-    tab.close()
+    tab.set_viewport_size(wide)
 
 
 def test_the_page_is_dark_where_the_user_wants_that(browser, page):
-    check_dark(browser, page.as_uri())
+    tab, wrong, _ = watched_tab(browser, page.as_uri(), color_scheme="dark")
+    check_dark(tab)
+    assert wrong == []
+    tab.close()
 
 
 def test_the_walk_and_its_buttons_fill_the_screen(opened):

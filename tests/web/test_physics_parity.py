@@ -1,8 +1,8 @@
 """A page's physics and controller, in Node, against the examiner's, frame by frame.
 
 Both are MuJoCo in float64. Measured on 30 November 2026, WebAssembly 3.14 against Python 3.17, in
-5 s: at most 1e-13 m or rad for key poses and expressions, disturbed or not, and 5e-11 for a brain in
-water. Bodies of blocks are chaotic: see `CHAOTIC`.
+5 s: at most 1e-13 m or rad for key poses and expressions, disturbed or not, and 5e-11 for a brain
+in water. Bodies of blocks are chaotic: see `CHAOTIC`.
 """
 
 import dataclasses
@@ -40,10 +40,10 @@ WALK = Path(__file__).parents[2] / "docs" / "data" / "walk"
 TOLERANCE = 1e-10
 """m or rad; torques relative to the largest."""
 CHAOTIC = {"a brain in water": 1e-8, "a brain on land": 1e-7, "two brains at a cube": 1e-4}
-"""Tolerance in 5 s where rounding errors grow, because joints bend to their ends and blocks collide.
-A brain in water differs by 1e-12 after 3.4 s and 5e-11 (torques: 2e-10) after 5 s; a brain on land
-by 1e-12 after 2.5 s, 1e-10 after 4.9 s and 6e-10 after 5 s; two brains at a cube by 1e-12 after
-0.9 s, 1e-10 after 1.9 s, 1e-8 after 2.5 s and 2e-7 (torques: 2e-6) after 5 s.
+"""Tolerance in 5 s where rounding errors grow, because joints bend to their ends and blocks
+collide. A brain in water differs by 1e-12 after 3.4 s and 5e-11 (torques: 2e-10) after 5 s; a brain
+on land by 1e-12 after 2.5 s, 1e-10 after 4.9 s and 6e-10 after 5 s; two brains at a cube by 1e-12
+after 0.9 s, 1e-10 after 1.9 s, 1e-8 after 2.5 s and 2e-7 (torques: 2e-6) after 5 s.
 """
 CALM = 0.8
 """s in which all motions agree within `TOLERANCE`."""

@@ -61,12 +61,12 @@ function pulls(simulation) {
     return place();
   };
   simulation.reset();
-  simulation.hold(trunk, place());
-  simulation.pull.target[2] += 1;
+  simulation.hand.hold(trunk, place());
+  simulation.hand.pull.target[2] += 1;
   const before = place(),
     rising = wait(1.8),
     held = wait(0.2);
-  simulation.letGo();
+  simulation.hand.letGo();
   return { before, rising, held, after: wait(1) };
 }
 
