@@ -23,7 +23,7 @@ SIDES = (("l", 1), ("r", -1))
 
 @dataclasses.dataclass(frozen=True)
 class Link:
-    """A part of a limb: its hinges, the way to its end in m, radius in m, mass in kg, more geoms."""
+    """A part of a limb: hinges, the way to its end in m, radius in m, mass in kg, more geoms."""
 
     name: str
     hinges: tuple[Hinge, ...]

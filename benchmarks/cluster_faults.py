@@ -44,8 +44,8 @@ name = "base"
 name = "slow"
 settings = {{ evolution = {{ mutation_rate = 0.1 }} }}
 """
-TRAIN = f"""--env {STOOL} --generations 60 --rollout.seconds 0.4 --rollout.starts 2 --rollout.lanes 4
---examination.candidates 0 --no-plots"""
+TRAIN = f"""--env {STOOL} --generations 60 --rollout.seconds 0.4 --rollout.starts 2
+--rollout.lanes 4 --examination.candidates 0 --no-plots"""
 RUNS = {
     "islands": "--population 6 --evolution.islands.count 4 --evolution.islands.every 2",
     "blocks": "--population 16 --rollout.block 4",

@@ -1,5 +1,4 @@
-"""Mutate files under guidance of the code that they reach, and stop at the first one that is not refused.
-
+"""Mutate files, guided by the code that they reach, and stop at the first that is not refused.
     pip install atheris
     python benchmarks/fuzz_readers.py bvh --seconds 600 --corpus fuzz/bvh
 

@@ -146,7 +146,7 @@ class Interrupter:
         by: signal.Signals = signal.SIGKILL,
         under: Sequence[str] = (),
     ) -> Ended:
-        """Run a command, under another program if wanted, and signal its group after some seconds."""
+        """Run a command, under another program if wanted, and signal its group seconds later."""
         environment = os.environ | {"PYTHONPATH": str(ROOT), "TERM": "dumb"}
         process = subprocess.Popen(
             [*under, *self.start, *arguments],

@@ -82,8 +82,8 @@ def describe(folder: Path) -> str:
         text = json.loads((folder / CERTIFICATE).read_text(encoding="utf-8"))
         passed, speed = "yes" if verdict_of(text).certified else "no", text["report"]["speed"]
     return (
-        f"| {folder.name} | {deep.max() * creature.frame.hip_height * 1e3:.1f} mm, {deep.max():.1%} "
-        f"| {names} "
+        f"| {folder.name} | {deep.max() * creature.frame.hip_height * 1e3:.1f} mm, "
+        f"{deep.max():.1%} | {names} "
         f"| {(deep > WORTH).mean():.0%} | {passed} | {speed:.2f} |"
     )
 

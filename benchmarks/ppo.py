@@ -5,10 +5,11 @@
 
 PPO (`benchmarks/peers/policy_gradient.py`) trains a network on `mjxgait.environment`. Its policy is
 the controller `network`, so a run folder holds a champion as evolution's does, and `mjxgait
-certify`, `share`, `render` and `inspect` work on it. With --certify the policy is validated every so
-many seconds and examined as a run of evolution examines its best: a nominal check, a selection draw,
-then the certificate; the first half of the time with a margin of `examination.enough`, then with any.
-All that happens in C MuJoCo beside the training, on the CPU. A seed ends at its first certificate or when its time is up.
+certify`, `share`, `render` and `inspect` work on it. With --certify the policy is validated every
+so many seconds and examined as a run of evolution examines its best: a nominal check, a selection
+draw, then the certificate; the first half of the time with a margin of `examination.enough`, then
+with any. All that happens in C MuJoCo beside the training, on the CPU. A seed ends at its first
+certificate or when its time is up.
 
 Prints a Markdown table, and writes it after each seed, with everything as JSON:
 

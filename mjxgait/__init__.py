@@ -11,6 +11,7 @@ Give it a body and it returns a walk that holds up in physics, tested in a secon
 
     run = mjxgait.train("duck", quiet=True, on_generation=lambda line: print(line["best"]))
     mjxgait.render(run, "walk.webp")      # also export, share, plot; `run` alone in a notebook
+    mjxgait.build("runs/walker", "robot")   # a body of blocks as printed parts and servos
     mjxgait.gallery(["runs/x", "runs/y"], "all.html")    # several champions on one page
     mjxgait.repertoire("tall_quadruped"); mjxgait.ablate("forced_evolution")   # many runs
     mjxgait.walk(run)                     # columns for pandas: joints, feet, trunk over time
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
         Run,
         UserError,
         ablate,
+        build,
         certify,
         environment,
         examine,
@@ -54,6 +56,7 @@ __all__ = [
     "Run",
     "UserError",
     "ablate",
+    "build",
     "certify",
     "environment",
     "examine",

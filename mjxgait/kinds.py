@@ -25,7 +25,8 @@ class ControllerKind:
     name: as in the settings (`use.controller`).
     home: the slice's package.
     controller: the class that moves bodies in the compiled program, a `Controller`.
-    reference: from creature, champion and step (s) to the reference controller in NumPy, a `ReferenceController`.
+    reference: from creature, champion and step (s) to the reference controller in NumPy, a
+    `ReferenceController`.
     opponent: the same for the body that a creature meets in a contest; None without contests.
     serializer: a `Serializer`; None writes the genome's arrays as they are.
     report: a `GenomeView`; None shows the arrays as they are.

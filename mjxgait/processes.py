@@ -183,7 +183,7 @@ def _begin(prepare: Callable[[], object] | None) -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process if the one that started it is killed; else it would wait for work forever."""
+    """End this process if the one that started it is killed; else it would wait forever."""
     if parent := multiprocessing.parent_process():
         parent.join()
         os._exit(1)

@@ -1,7 +1,6 @@
-"""Build the add-ons for other programs as files to install: `python scripts/build_addons.py --out DIR`.
-
-Writes `mjxgait-blender-VERSION.zip`, for Blender's "Install from Disk", and the same for Godot, Unity
-and Unreal, to unpack in the folder of a project. The same files make the same bytes.
+"""Build the add-ons for other programs to install: `python scripts/build_addons.py --out DIR`.
+Writes `mjxgait-blender-VERSION.zip`, for Blender's "Install from Disk", and the same for Godot,
+Unity and Unreal, to unpack in the folder of a project. The same files make the same bytes.
 """
 
 import argparse

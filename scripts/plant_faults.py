@@ -57,7 +57,8 @@ class Fault:
 class Finding:
     """Result of a fault.
 
-    caught_by: the first test that failed, None where all passed. reason: its assertion or exception.
+    caught_by: the first test that failed, None where all passed. reason: its assertion or
+    exception.
     """
 
     fault: Fault

@@ -36,7 +36,8 @@ def main() -> None:
         for what in ("target", "pos")
     )
     data.qpos[:7], data.qpos[at] = base[0], begin[0]
-    # MuJoCo integrates joint damping implicitly, which keeps PD control stable (docs/reference/controller.md).
+    # MuJoCo integrates joint damping implicitly, which keeps PD control stable
+    # (docs/reference/controller.md).
     model.dof_damping[of] += kd
     for k in range(min(round(options.seconds / step), len(target) - 1)):
         torque = kp * (target[k] - data.qpos[at] - step * data.qvel[of])

@@ -129,12 +129,12 @@ def _seen(found: Mapping[str, Any]) -> str:
     aside, slip = 100 * found["drift"] * found["distance"], found["slip"]
     return "\n".join(
         [
-            f"- In {found['seconds']:.0f} s the feet swing {', '.join(map(str, swings))} times. A stride takes "
-            f"{stride:.2f} s.",
+            f"- In {found['seconds']:.0f} s the feet swing {', '.join(map(str, swings))} times. A "
+            f"stride takes {stride:.2f} s.",
             f"- The standard deviation of the stride period is {varied:.2f} frames of "
             f"{1e3 * found['dt']:.0f} ms.",
-            f"- The trunk is at most {aside:.0f} cm off the line over {found['distance']:.0f} m. Each foot "
-            f"slides {slip.min():.1f} to {slip.max():.1f} m meanwhile.",
+            f"- The trunk is at most {aside:.0f} cm off the line over {found['distance']:.0f} m. "
+            f"Each foot slides {slip.min():.1f} to {slip.max():.1f} m meanwhile.",
         ]
     )
 

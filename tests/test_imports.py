@@ -19,7 +19,7 @@ FLOORS = (
     ("distributed",),
     ("web",),
     ("importer",),
-    ("animation",),
+    ("animation", "hardware"),
     ("rendering",),
     ("inspect", "controllers/*/report"),
     ("environments",),

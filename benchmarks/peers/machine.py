@@ -95,8 +95,9 @@ def _processor() -> str:
 
 # fmt: off
 ONE_EACH = frozenset((
-    "add", "sub", "mul", "div", "neg", "abs", "max", "min", "sqrt", "rsqrt", "square", "pow", "integer_pow", "exp", "log",
-    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "floor", "sign", "clamp", "select_n", "lt", "le", "gt", "ge", "eq", "ne",
+    "add", "sub", "mul", "div", "neg", "abs", "max", "min", "sqrt", "rsqrt", "square", "pow",
+    "integer_pow", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "floor", "sign", "clamp",
+    "select_n", "lt", "le", "gt", "ge", "eq", "ne",
 ))
 # fmt: on
 """Primitives with one operation per element of their result."""

@@ -99,8 +99,8 @@ class Batch(NamedTuple):
 class World:
     """What PPO trains on. Functions are for all environments.
 
-    step: from states and actions [B, J] to states. observe: inputs [B, I]. outcome: reward, fell, over
-    [B]. restart: fresh states where [B]. policy: the middle of the actions [B, J] under a
+    step: from states and actions [B, J] to states. observe: inputs [B, I]. outcome: reward, fell,
+    over [B]. restart: fresh states where [B]. policy: the middle of the actions [B, J] under a
     network and inputs [B, I].
     """
 

@@ -15,6 +15,7 @@ from mjxgait.api.films import render
 from mjxgait.api.galleries import gallery
 from mjxgait.api.make import load_creature, refine, train
 from mjxgait.api.repertoires import repertoire
+from mjxgait.api.robots import build
 from mjxgait.api.run import Run, frames, open
 from mjxgait.api.studies import ablate
 from mjxgait.errors import UserError
@@ -23,6 +24,7 @@ __all__ = [
     "Run",
     "UserError",
     "ablate",
+    "build",
     "certify",
     "environment",
     "examine",

@@ -28,7 +28,7 @@ def import_model(
     force: bool = False,
     tell: Callable[[str], object] = lambda said: None,
 ) -> Creature:
-    """Make a creature folder from a model (MJCF, URDF, xacro, BVH, GLB); return the creature.
+    """Make a creature folder from a model (MJCF, URDF, xacro, BVH, GLB, FBX); return the creature.
 
     Does the same as `mjxgait import` (docs/guide/your-own-body.md).
 
@@ -75,8 +75,8 @@ def check_folder(folder: Path, read: Sequence[Path], model: Path, force: bool) -
     """
     if folder.resolve() in {place.resolve() for place in (model.parent, *read)}:
         raise UserError(
-            f"{folder}: the import reads from this folder, so it writes nothing there; name another "
-            "with --out"
+            f"{folder}: the import reads from this folder, so it writes nothing there; name "
+            "another with --out"
         )
     if not folder.exists():
         return

@@ -66,7 +66,8 @@ def verify(run: Run | Place) -> list[str]:
     stored, path = known.certificate, known.folder / CERTIFICATE
     if stored is None:
         raise UserError(
-            f"{path}: not there; {command('certify', known.folder, run=known.folder)} examines the champion"
+            f"{path}: not there; {command('certify', known.folder, run=known.folder)} examines the "
+            "champion"
         )
     config = build(CertificateConfig, stored.get("config", {}), str(path))
     return differences(

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from mjxgait.importer.origin import Found
     from mjxgait.rendering.walk import Walk
 
-KINDS = (".glb", ".bvh", ".usda", ".usdc", ".csv", ".json")
+KINDS = (".glb", ".fbx", ".bvh", ".usda", ".usdc", ".csv", ".json")
 NUMBERS = (".csv", ".json")
 PAGES = (".html", ".htm")
-ONTO, CAPSULES = ".glb", "none"
-"""End of a file with a character; and what is given instead of one."""
+ONTO, CAPSULES = (".glb", ".fbx"), "none"
+"""Ends of a file with a character; and what is given instead of one."""
 Tell = Callable[[str], object]
 
 
@@ -33,21 +33,22 @@ def export(
     travelling: bool = False,
     tell: Tell = lambda said: None,
 ) -> Path:
-    """Write the champion's walk as a loop (GLB, BVH, USD) or as numbers (CSV, JSON); return the file.
+    """Write the walk as a loop (GLB, FBX, BVH, USD) or as numbers (CSV, JSON); return the file.
 
     Does the same as `mjxgait export`.
 
     Args:
       out: the file; its ending chooses the format.
-      onto: the character (GLB) that the creature was imported from; by default the file that was
-        imported, if it is still there. "none" writes the body of capsules.
+      onto: the character (GLB, FBX) that the creature was imported from; by default the file that
+        was imported, if it is still there. "none" writes the body of capsules.
       rate: key frames per second.
       travelling: moves the root forward.
       tell: called with what was written, and with doubts about the walk.
 
     Raises:
-      UserError: no champion, a wrong ending, or the file cannot be written.
+      UserError: no champion, a wrong ending, FBX without a Blender, or the file cannot be written.
     """
+    from mjxgait.animation.clips.fbx import require_blender
     from mjxgait.animation.export import read_character, walk_loop
     from mjxgait.animation.export.facts import examined
     from mjxgait.importer.origin import Found, find_character
@@ -58,6 +59,7 @@ def export(
     over = None if onto is None or str(onto) == CAPSULES else path_of(onto)
     _check_names(file, over)
     require_output(file)
+    require_blender(file)
     character = None if over is None else read_character(over)
     walk = champion_of(folder, LOOP_SECONDS).walk
     notes: list[str] = []
@@ -65,7 +67,7 @@ def export(
         said = _numbers(walk, file)
     else:
         loop = dataclasses.replace(walk_loop(walk, rate), certificate=examined(folder, walk))
-        if file.suffix.lower() != ONTO or over is not None:
+        if file.suffix.lower() not in ONTO or over is not None:
             said = _animation(loop, character, file, travelling)
         else:
             own = find_character(walk.creature, folder)
@@ -207,8 +209,9 @@ def _check_names(out: Path, onto: Path | None) -> None:
     kind = out.suffix.lower()
     if onto is None:
         return
-    if kind != ONTO:
-        raise UserError(f"{out}: with --onto a character is written; end the name with .glb")
+    if kind not in ONTO:
+        ends = " or ".join(ONTO)
+        raise UserError(f"{out}: with --onto a character is written; end the name with {ends}")
     if out.exists() and onto.exists() and out.samefile(onto):
         raise UserError(f"{out}: is your character, which stays; name another file with --out")
 
@@ -219,6 +222,6 @@ def _write(loop: "WalkLoop", character: "Character | None", out: Path, travellin
 
     if character is not None:
         return f'animation "{export_onto(loop, character, out, travelling)}", '
-    writers = {".glb": export_glb, ".bvh": export_bvh}
+    writers = {**dict.fromkeys(ONTO, export_glb), ".bvh": export_bvh}
     writers.get(out.suffix.lower(), export_usd)(loop, out, travelling)
     return ""

@@ -34,8 +34,7 @@ def gallery(
     title: str = "",
     tell: Tell = lambda said: None,
 ) -> Path:
-    """Write one offline page on which champions move side by side, by what they do; return the file.
-
+    """Write an offline page on which champions move side by side, by what they do; return it.
     Does the same as `mjxgait gallery`. Each has a word for how it moves (docs/guide/seeing.md).
 
     Args:

@@ -191,7 +191,7 @@ def refine(
 
     Args:
       env: as for `train`.
-      keys: file with the cycle: GLB, BVH, CSV or JSON.
+      keys: file with the cycle: GLB, FBX, BVH, CSV or JSON.
       out: as for `train`.
       keep: 1 fixes the poses, 0 lets each joint depart by 30 degrees and the period by 30 %.
       names: name in the file by part (CSV or JSON: joint), or a TOML file of these, where the

@@ -46,7 +46,7 @@ class RepertoireRequest:
 
     Attributes:
       env: Name of a shipped creature, path of a creature folder, or a model file
-        (MJCF, URDF, xacro, BVH or GLB).
+        (MJCF, URDF, xacro, BVH, GLB or FBX).
       speeds: Speeds: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
       turns: Turn rates in degrees per second, each to both sides; straight on is always included.
       gait: Gait of all walks; see `mjxgait train --help`.
@@ -63,8 +63,8 @@ class RepertoireRequest:
       physics: mjx simulates with MJX itself instead of this program's faster step.
       rate: Key frames per second of the clips.
       travelling: Move the root in the clips; otherwise the creature walks in place.
-      onto: The character (GLB) that the creature was imported from; its file gets the clips, with
-        its own mesh.
+      onto: The character (GLB, FBX) that the creature was imported from; its file gets the clips,
+        with its own mesh.
       blends: Test in C MuJoCo also the blends half way between neighbours, and changes from one to
         the other while walking.
       cluster: Evolve on a Ray cluster: HOST:PORT, or auto (docs/guide/cluster.md).
@@ -124,7 +124,7 @@ def repertoire(
       seed: of all random numbers.
       rate: key frames per second of the clips.
       travelling: moves the root in the clips.
-      onto: the character (GLB) of which the creature was imported; its file gets the clips.
+      onto: the character (GLB, FBX) of which the creature was imported; its file gets the clips.
       blends: tests blends and changes between neighbours too.
       quiet: prints nothing.
 

@@ -17,7 +17,7 @@ from mjxgait.errors import UserError
 from mjxgait.extras import install_command
 from mjxgait.files import path_of
 from mjxgait.training.folder import CERTIFICATE, CHAMPION, METRICS, open_champion, open_run
-from mjxgait.training.logs import MOTHERS, columns, read_metrics
+from mjxgait.training.logs import PARENTS, columns, read_metrics
 
 if TYPE_CHECKING:  # all drawing code; an extra
     import pandas
@@ -85,13 +85,14 @@ class Run:
     def metrics(self) -> dict[str, np.ndarray]:
         """Return each metric of `metrics.jsonl` over generations [G], NaN where it is missing.
 
-        `mothers`, if logged, is [G, P].
+        `mothers` and `fathers`, if logged, are [G, P].
         """
         lines = read_metrics(self.folder / METRICS)
-        mothers = [line[MOTHERS] for line in lines if MOTHERS in line]
         found = columns(lines)
-        if 0 < len(mothers) == len(lines):
-            found[MOTHERS] = np.array(mothers)
+        for name in PARENTS:
+            places = [line[name] for line in lines if name in line]
+            if 0 < len(places) == len(lines):
+                found[name] = np.array(places)
         return found
 
     def _repr_html_(self) -> str:
@@ -107,13 +108,15 @@ class Run:
         return f"<p>{place}: {words}, {fitness}</p>{walk_image(self.folder)}"
 
     def frame(self) -> "pandas.DataFrame":
-        """Return `metrics.jsonl` as a table, a row per generation; without `mothers`.
+        """Return `metrics.jsonl` as a table, a row per generation; without those of parents.
 
         Raises:
           UserError: pandas is not installed, or the log is damaged.
         """
         lines = read_metrics(self.folder / METRICS)
-        rows = [{name: value for name, value in line.items() if name != MOTHERS} for line in lines]
+        rows = [
+            {name: value for name, value in line.items() if name not in PARENTS} for line in lines
+        ]
         columns = None if rows else ["generation"]
         return _pandas().DataFrame(rows, columns=columns).set_index("generation")
 

@@ -93,8 +93,7 @@ def ablate(
     hours: float = 12.0,
     quiet: bool = False,
 ) -> Path:
-    """Run a study, variants times seeds side by side, and return its report (docs/guide/studies.md).
-
+    """Run a study, variants times seeds side by side; return its report (docs/guide/studies.md).
     Does the same as `mjxgait ablate`. Beside report.md lie report.html, results.csv and
     generations.parquet.
 

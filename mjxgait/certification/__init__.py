@@ -11,6 +11,12 @@ from mjxgait.certification.certificate import (
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.certification.skills import certify, nominal_check, trial_run
+from mjxgait.certification.state import (
+    Lack,
+    NoCertificate,
+    ValidCertificate,
+    certificate_state,
+)
 from mjxgait.certification.validity import (
     outdated,
     read_certificate,
@@ -28,9 +34,13 @@ __all__ = [
     "Certificate",
     "CertificateConfig",
     "Criterion",
+    "Lack",
     "Measure",
+    "NoCertificate",
     "NominalCheck",
+    "ValidCertificate",
     "Verdict",
+    "certificate_state",
     "certify",
     "criteria_of",
     "distance",

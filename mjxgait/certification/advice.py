@@ -55,7 +55,7 @@ def advised(
 
 
 def entry_of(criterion: Criterion, measure: Measure) -> Entry:
-    """Return the entry on a measure; one made of its numbers if it belongs to a task of the user."""
+    """Return the entry on a measure; one made of its numbers if the task is the user's."""
     known = (entry for entry in TABLE if entry.fits(criterion, measure))
     most = "is needed" if measure.sense == ">=" else "is allowed"
     return next(known, Entry("*", f"Its {{name}} is {{v:.3g}}; {{t:.3g}} {most}."))

@@ -201,8 +201,8 @@ class _Body:
             low, high = np.ptp(along), (along + reach).max() - (along - reach).min()
         if not low - EXACT <= creature.frame.body_length <= high + EXACT:
             raise UserError(
-                f"{creature.name}: its body length is {creature.frame.body_length:g} m, but by its files "
-                f"it is {low:.3g} to {high:.3g} m; nothing it does can be examined"
+                f"{creature.name}: its body length is {creature.frame.body_length:g} m, but by its "
+                f"files it is {low:.3g} to {high:.3g} m; nothing it does can be examined"
             )
 
     def check_mirror(self, creature: Creature) -> None:
@@ -243,8 +243,9 @@ class _Body:
                 if angle > LIKENESS or away > LIKENESS * creature.frame.hip_height:
                     raise UserError(
                         f'{creature.name}: joint "{self.names[j]}" does not mirror '
-                        f'"{self.names[partner]}" with sign {creature.mirror.sign[j]}: in a random pose '
-                        f"it is {away:.3g} m and {angle:.2g} rad off; settle it in [mirror] pairs"
+                        f'"{self.names[partner]}" with sign {creature.mirror.sign[j]}: in a random '
+                        f"pose it is {away:.3g} m and {angle:.2g} rad off; settle it in [mirror] "
+                        "pairs"
                     )
 
     def _parts(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

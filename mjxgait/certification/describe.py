@@ -105,8 +105,8 @@ def pairs_of(window: Recording) -> list[tuple[int, int]]:
 def likeness(window: Recording, clearance: float) -> dict[str, float]:
     """Compare a walk with that of an animal with such legs at this speed.
 
-    stride, duty_factor: over the animal's. reach: see `stance_offset`. pitch: mean deg of the nose above
-    the horizon. patter: see `patter`; an animal has none.
+    stride, duty_factor: over the animal's. reach: see `stance_offset`. pitch: mean deg of the nose
+    above the horizon. patter: see `patter`; an animal has none.
     clearance: rise of a foot in a swing, in hip heights.
     """
     hip, v = window.dimensions.hip_height, speed(window)

@@ -94,8 +94,8 @@ STAYS_UP = (
         "A part that is not a foot is on the floor for {v:.0%} of the time.",
         by_task=_goals(_raise("ground"))
         | _walk(
-            "Raise --fitness.weights.touch; or name the part under `ground` in creature.toml, if it "
-            "may touch the floor."
+            "Raise --fitness.weights.touch; or name the part under `ground` in creature.toml, if "
+            "it may touch the floor."
         ),
     ),
     Entry(
@@ -130,7 +130,8 @@ PROGRESS = (
     ),
     Entry(
         "second half*/ first*",
-        "It slows down: the second half of the time brings {v:.0%} of the first; {t:.0%} is needed.",
+        "It slows down: the second half of the time brings {v:.0%} of the first; {t:.0%} is "
+        "needed.",
         "Simulate longer episodes: --rollout.seconds.",
         _walk("Raise --fitness.weights.fade, or simulate longer episodes: --rollout.seconds."),
     ),
@@ -178,7 +179,8 @@ DISTURBED = (
 AT_A_FINER_STEP = (
     Entry(
         "failures in *",
-        "At half the time step it fails {v:.0f} measures: the motion depends on the size of the step.",
+        "At half the time step it fails {v:.0f} measures: the motion depends on the size of the "
+        "step.",
         order=FOLLOWS,
     ),
     Entry(
@@ -280,9 +282,10 @@ PHYSICS = (
     ),
     Entry(
         "not examined: mass without a shape / mass",
-        "Parts with {v:.0%} of the mass have no shape, so that their overlap is unknown; {t:.0%} is "
-        "allowed.",
-        "Put their mesh files beside the model, or name their folder with `mjxgait import --search`.",
+        "Parts with {v:.0%} of the mass have no shape, so that their overlap is unknown; {t:.0%} "
+        "is allowed.",
+        "Put their mesh files beside the model, or name their folder with `mjxgait import "
+        "--search`.",
     ),
 )
 TARGETS = (
@@ -342,7 +345,8 @@ OTHER_TASKS = (
     ),
     Entry(
         "* block's size",
-        "Blocks stand {v:.0%} of their size deep in each other or in the ground; {t:.0%} is allowed.",
+        "Blocks stand {v:.0%} of their size deep in each other or in the ground; {t:.0%} is "
+        "allowed.",
         "Make overlap dearer: a lower --fitness.overlap.",
     ),
     Entry(

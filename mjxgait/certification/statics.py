@@ -1,7 +1,8 @@
 """Torques that carry a body in a step: gravity against vertical contact forces, in C MuJoCo.
 
 In a step half of the feet are in the air, so a leg carries twice its share of the standing weight.
-How high the trunk is and where a sole presses is free: the least torque counts. Inertia and impacts come on top.
+How high the trunk is and where a sole presses is free: the least torque counts. Inertia and impacts
+come on top.
 
 Letters: `C` contact points, `J` actuated joints, `j` those of one leg.
 """

@@ -1,5 +1,4 @@
-"""A harder test than the certificate: bumps, slopes, slippery floors, pushes and ten minutes of walking.
-
+"""A harder test than the certificate: bumps, slopes, slippery floors, pushes, ten minutes' walk.
 Each function returns the creature with another model. Its parts, their masses and all indices stay
 the same, so `simulate` accepts it with every champion of the creature. Uneven ground is set by the
 creature's `terrain`: `creature.on("rough:0.05")`.

@@ -174,7 +174,10 @@ def outdated(document: Document, champion: Champion, creature: Creature) -> str 
     copying a run, or writing the same champion again, changes them.
     """
     if "champion" not in document:
-        return "The certificate is outdated: it does not say which champion was examined, as those of earlier versions."
+        return (
+            "The certificate is outdated: "
+            "it does not say which champion was examined, as those of earlier versions."
+        )
     if document["champion"] != champion.fingerprint:
         return (
             "The certificate is outdated: "

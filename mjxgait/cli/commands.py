@@ -31,6 +31,7 @@ COMMANDS = {
     "plot": Command("draw a run: fitness, footfalls, joints, a filmstrip", "mjxgait plot RUN"),
     "render": Command("make a video of a walk or a race", "mjxgait render RUN --out walk.webp"),
     "export": Command("write a walk as an animation file", "mjxgait export RUN --out walk.glb"),
+    "build": Command("design a robot from a body of blocks", "mjxgait build RUN --out robot"),
     "share": Command("write one offline page of a walk in 3D", "mjxgait share RUN --out walk.html"),
     "gallery": Command(
         "show champions side by side on one page",

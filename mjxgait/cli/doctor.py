@@ -11,6 +11,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
+from mjxgait.animation.clips.fbx import VARIABLE, WAYS, find_blender
 from mjxgait.cache import named_folder, own_folder, programs_in
 from mjxgait.cli.cache import in_words
 from mjxgait.cli.options import parsed
@@ -87,6 +88,7 @@ def findings() -> Iterator[Finding]:
     yield disk(Path.cwd())
     yield cache(named_folder() or own_folder())
     yield compiler(shutil.which)
+    yield blender(find_blender())
     yield accelerator()
     yield renderer(os.environ.get("MUJOCO_GL"))
 
@@ -143,6 +145,15 @@ def compiler(find: Callable[[str], str | None]) -> Finding:
     found = next((path for name in COMPILERS if (path := find(name))), None)
     remedy = "" if found else "only for benchmarks: install gcc or clang"
     return Finding("C compiler", found or "none found", remedy)
+
+
+def blender(command: Sequence[str]) -> Finding:
+    """Return the finding about Blender. command: words that run a script in it; none without one."""
+    if not command:
+        return Finding("Blender", "none found", f"only for FBX files: {WAYS}")
+    there = shutil.which(command[0])
+    remedy = "" if there else f"cannot be started: correct {VARIABLE}"
+    return Finding("Blender", command[0], remedy)
 
 
 def accelerator() -> Finding:

@@ -139,8 +139,8 @@ def _check_same(options: GalleryOptions, study: Path) -> None:
         asked = getattr(options, name)
         if asked is not None and asked != value:
             raise UserError(
-                f"{study}: holds runs with --{name} {value}; leave --{name} {asked} out to keep them, "
-                "or name another folder with --study"
+                f"{study}: holds runs with --{name} {value}; leave --{name} {asked} out to keep "
+                "them, or name another folder with --study"
             )
 
 

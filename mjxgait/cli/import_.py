@@ -21,7 +21,7 @@ Words = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 class ImportOptions:
     """Make a creature folder from a model file, and report every change and guess.
 
-    Reads MJCF, URDF, xacro, and a character's skeleton (BVH, or a skinned GLB).
+    Reads MJCF, URDF, xacro, and a character's skeleton (BVH, or a skinned GLB or FBX).
 
     Attributes:
       model: The file; or robot:NAME, such as robot:go2, a robot of the package robot_descriptions.

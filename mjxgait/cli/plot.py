@@ -22,17 +22,26 @@ class PlotOptions:
       run: Run folder.
       out: Folder for the plots; by default RUN/plots.
       formats: File formats.
+      family_tree: PNG file for the champion's family instead of the plots: each body that its
+        ancestors had, by generation. For bodies of blocks.
     """
 
     run: tyro.conf.Positional[Path]
     out: Path | None = None
     formats: tuple[Literal["png", "svg"], ...] = ("png", "svg")
+    family_tree: Path | None = None
 
 
 def plot_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     options = parsed(PlotOptions, "plot", arguments)
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
+    if options.family_tree is not None:
+        from mjxgait.rendering.family import draw_family_tree
+
+        draw_family_tree(options.run, options.family_tree)
+        print(options.family_tree)
+        return 0
     from mjxgait.rendering.plots import plot_run
 
     for file in plot_run(options.run, options.out, options.formats):

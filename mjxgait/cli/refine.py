@@ -25,7 +25,7 @@ class RefineOptions(Verbosity):
 
     Attributes:
       env: Name of a shipped creature, path of a creature folder, or a model file.
-      keys: The cycle: .glb, .bvh, or .csv or .json of joint angles (docs/guide/refine.md).
+      keys: The cycle: .glb, .fbx, .bvh, or .csv or .json of joint angles (docs/guide/refine.md).
       out: Folder for the run; by default a new one under runs/.
       keep: Share to keep: 1 fixes the poses, 0 lets every joint depart by 30 degrees and the period
         by 30 %. Several values make a run each, below --out, and a picture of all.

@@ -1,4 +1,4 @@
-"""`mjxgait share`: one offline page with a run's champion, recorded or simulated, or a repertoire."""
+"""`mjxgait share`: an offline page of a run's champion, recorded or simulated, or a repertoire."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -19,9 +19,9 @@ class ShareOptions:
     Attributes:
       run: Run folder, or the folder of a repertoire.
       out: File to write, ending with .html.
-      physics: A page that simulates the champion instead of playing its walk: pull it, push it, tilt
-        the floor. For key poses, expressions and brains. It contains MuJoCo's WebAssembly build,
-        which npm fetches once.
+      physics: A page that simulates the champion instead of playing its walk: pull it, push it,
+        tilt the floor. For key poses, expressions and brains. It contains MuJoCo's WebAssembly
+        build, which npm fetches once.
       wasm: Folder of the unpacked npm package @mujoco/mujoco, instead of npm.
     """
 

@@ -24,7 +24,7 @@ class TrainOptions(Verbosity):
 
     Attributes:
       env: Name of a shipped creature, path of a creature folder, robot:NAME, or a model file to
-        import (MJCF, URDF, xacro, BVH or GLB).
+        import (MJCF, URDF, xacro, BVH, GLB or FBX).
       config: TOML file with settings, or the name of a shipped config such as wilson.
       scale: Size factors of parts, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
         (docs/reference/creature-folder.md). Lengths, masses and inertias follow, gains do not.
@@ -65,8 +65,8 @@ class TrainOptions(Verbosity):
       ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05; short for --rollout.ground.
       physics: Short for --rollout.physics: mjx simulates with MJX itself, auto with this program's
         faster step where it supports the model (docs/research/performance.md).
-      log: Log for a tracker, repeatable: tensorboard writes event files into the run folder, wandb an
-        offline run (docs/guide/research-tools.md).
+      log: Log for a tracker, repeatable: tensorboard writes event files into the run folder, wandb
+        an offline run (docs/guide/research-tools.md).
       view: Show the best of each generation walking on a page that only this machine can reach.
       plots: Draw all plots at the end of the run (`mjxgait plot`).
       settings: The config, key by key.
@@ -111,8 +111,8 @@ SHORT = f"""Evolve a walk for a creature.
 
 You may name the creature first: `mjxgait train crab`. The run folder gets the champion, its
 certificate and its plots.
-`mjxgait train {HELP_ALL}` lists further options and every key of the config; --controller and --task
-select another controller and task (docs/guide/your-own-task.md).
+`mjxgait train {HELP_ALL}` lists further options and every key of the config; --controller and
+--task select another controller and task (docs/guide/your-own-task.md).
 """
 
 

@@ -244,8 +244,8 @@ def _layers(
         for name in ("env", "config"):
             if getattr(given, name):
                 raise UserError(
-                    f"{given.resume}: a resumed run keeps its creature and its settings; leave --{name} "
-                    "out"
+                    f"{given.resume}: a resumed run keeps its creature and its settings; leave "
+                    f"--{name} out"
                 )
         folder = Path(given.resume)
         return open_run(folders_of(folder)[0] if is_multi_seed(folder) else folder)

@@ -233,8 +233,8 @@ class EvolutionConfig:
             raise ValueError(f"{which} is for children that are born all at once")
         if self.search == "es" and self.offspring - self.elites < 2:
             raise ValueError(
-                f'search = "es" learns from at least 2 children of a generation, and these settings '
-                f"leave {self.offspring - self.elites}; make population or growth larger"
+                'search = "es" learns from at least 2 children of a generation, and these '
+                f"settings leave {self.offspring - self.elites}; make population or growth larger"
             )
         if self.elite and self.survival == "best":
             raise ValueError(

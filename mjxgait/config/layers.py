@@ -42,8 +42,8 @@ def find_creature(name: str) -> Path:
         return folder
     if folder.is_dir():
         raise UserError(
-            f"{folder}: no creature folder (it has no creature.toml); `mjxgait import` makes one of a "
-            "model file"
+            f"{folder}: no creature folder (it has no creature.toml); `mjxgait import` makes one "
+            "of a model file"
         )
     if folder.suffix or len(folder.parts) > 1:
         raise UserError(f"{folder}: no such file or folder")

@@ -65,8 +65,8 @@ class RolloutConfig:
       variety: multiple of the perturbed starts to draw in all; each generation takes the next ones.
         Above 1 every individual must be evaluated anew: `evolution.elite`.
       hold: generations that have the same perturbed starts, before the next ones come.
-      moves: s; time at which the lights of the perturbed starts change places, for tasks that follow
-        one; 0 for never.
+      moves: s; time at which the lights of the perturbed starts change places, for tasks that
+        follow one; 0 for never.
       joint_noise: rad; half width of the uniform perturbation of each joint at a perturbed start.
       velocity_noise: rad/s; the same for the speeds of the joints.
       friction: range of the factor on the floor's friction.

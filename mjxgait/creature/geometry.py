@@ -17,7 +17,7 @@ The axes of twenty joints within it are of rank one to within 0.01, the limit of
 
 
 def posed(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
-    """Data of a model with bodies, joints and geoms placed for one pose [nq]; nothing else is set."""
+    """Data of a model with bodies, joints and geoms placed for one pose [nq], and no more."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)

@@ -109,8 +109,8 @@ def stepping_of(
         moved = [f for f, chain in enumerate(chains) if int(model.jnt_bodyid[joint]) in chain]
         if weighs and len(moved) != 1:
             raise UserError(
-                f'stepping: joint "{model.joint(joint).name}" moves {len(moved)} feet; give weights '
-                "to joints that move one"
+                f'stepping: joint "{model.joint(joint).name}" moves {len(moved)} feet; give '
+                "weights to joints that move one"
             )
         legs.append(moved[0] if moved else 0)
     return Stepping(ahead, aside, turn, tuple(legs))
@@ -129,8 +129,8 @@ def swings_of(
     for arm, swing in settings.items():
         if swing.leg in settings:
             raise UserError(
-                f'swing: "{arm}" swings with "{swing.leg}", which itself swings with another joint; '
-                "name a joint of a leg"
+                f'swing: "{arm}" swings with "{swing.leg}", which itself swings with another '
+                "joint; name a joint of a leg"
             )
     return tuple(
         (names.index(arm), names.index(swing.leg), swing.share) for arm, swing in settings.items()

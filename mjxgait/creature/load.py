@@ -33,7 +33,8 @@ from mjxgait.files import read_text
 from mjxgait.tasks.walk.gaits import stations_of
 
 NOT_ALONE = re.compile(
-    r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
+    r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|"
+    r"flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
 )
 HEAVIEST = 1e6
 """Limit of a body's mass in kg and of its moments of inertia in kg·m²."""
@@ -208,7 +209,8 @@ def _standing(model: mujoco.MjModel, keyframe: str) -> mujoco.MjData:
     key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
     if key < 0:
         raise UserError(
-            f'creature.xml has no keyframe "{keyframe}" for the standing pose; add <keyframe><key name="{keyframe}" qpos=.../>'
+            f'creature.xml has no keyframe "{keyframe}" for the standing pose; add <keyframe><key '
+            f'name="{keyframe}" qpos=.../>'
         )
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)
@@ -317,8 +319,8 @@ def _check_plane(creature: Creature, data: mujoco.MjData) -> None:
     for name, alike in zip(names, geometry.parallel(axes), strict=True):
         if not alike:
             raise UserError(
-                f'creature.planar: joint "{name}" turns about another axis than "{names[0]}", so this '
-                "is no body in a plane; leave `planar` out"
+                f'creature.planar: joint "{name}" turns about another axis than "{names[0]}", so '
+                "this is no body in a plane; leave `planar` out"
             )
 
 
@@ -355,6 +357,6 @@ def _check(creature: Creature, data: mujoco.MjData) -> None:
         if h * h * creature.gains.kp[j] >= (4 * inertia[j] + 2 * h * creature.gains.kd[j]) / 3:
             need = (1.5 * h * h * creature.gains.kp[j] - 2 * inertia[j]) / h
             raise UserError(
-                f'joint "{name}": kp = {creature.gains.kp[j]:g} is unstable at a time step of {h:g} s; '
-                f"raise kd to {need:.3g} or lower kp"
+                f'joint "{name}": kp = {creature.gains.kp[j]:g} is unstable at a time step of '
+                f"{h:g} s; raise kd to {need:.3g} or lower kp"
             )

@@ -109,8 +109,7 @@ def connected(
     tell: Callable[[str], object],
     watch: Callable[[Scheduler], object] = lambda scheduler: None,
 ) -> Iterator[Scheduler]:
-    """Connect to a Ray cluster and yield its scheduler; all that it runs for us ends with the block.
-
+    """Connect to a Ray cluster and yield its scheduler; its work for us ends with the block.
     Args:
       address: HOST:PORT, or auto for the cluster that this machine belongs to.
       tell, watch: see `Scheduler`.

@@ -27,7 +27,7 @@ from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import EXAMS, ISLANDS, METRICS, MIGRATIONS
 from mjxgait.training.lock import locked_run
-from mjxgait.training.logs import MOTHERS, Line, append_lines, truncate_metrics
+from mjxgait.training.logs import PARENTS, Line, append_lines, truncate_metrics
 from mjxgait.training.loop import conclude, interruptible, keep_best, report
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
@@ -78,8 +78,8 @@ def together(lines: Sequence[Line], seconds: float) -> Line:
     bests = [-np.inf if line["best"] is None else line["best"] for line in lines]
     leader = int(np.argmax(bests))
     line = dict(lines[leader]) | {"island": leader}
-    # A migrant has no mother on this island.
-    line.pop(MOTHERS, None)
+    # A migrant has no parents on this island.
+    line = {name: value for name, value in line.items() if name not in PARENTS}
     line |= {name: sum(each[name] for each in lines) for name in SUMS}
     for name in MEANS:
         known = [each[name] for each in lines if each[name] is not None]

@@ -189,8 +189,8 @@ def block_size(offspring: int, most: int) -> int:
     size = next(n for n in range(min(most, offspring), 0, -1) if offspring % n == 0)
     if 2 * size < min(most, offspring):
         raise UserError(
-            f"{offspring} offspring of a generation cannot be cut into equal blocks of at most {most}; "
-            "take another --population or --rollout.block"
+            f"{offspring} offspring of a generation cannot be cut into equal blocks of at most "
+            f"{most}; take another --population or --rollout.block"
         )
     return size
 

@@ -1,8 +1,8 @@
 """A functional environment in JAX: pure `reset` and `step` in the physics of evolution.
 
 The state follows brax and MuJoCo Playground. Nothing is jitted here: the caller jits what contains
-the steps. The functions are for one episode; `jax.vmap` makes its episodes the lanes of the physics,
-which is what these are fast at.
+the steps. The functions are for one episode; `jax.vmap` makes its episodes the lanes of the
+physics, which is what these are fast at.
 """
 
 import dataclasses

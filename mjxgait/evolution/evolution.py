@@ -13,8 +13,9 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.evolution.offspring import children, forced
+from mjxgait.evolution.offspring import Parents, children, forced
 from mjxgait.evolution.state import (
+    NO_FATHER,
     NO_MOTHER,
     EvolutionState,
     GenerationMetrics,
@@ -75,9 +76,10 @@ class Evolution:
     def propose(self, state: EvolutionState) -> Proposal:
         """Return the offspring of a generation."""
         key, key_offspring = jax.random.split(state.key)
-        offspring, origin, mothers = self._offspring(key_offspring, state, self._seeding(state))
+        offspring, origin, parents = self._offspring(key_offspring, state, self._seeding(state))
         born = jnp.full(self.config.offspring, state.generation + 1)
-        proposal = self._with_elite(state, Proposal(key, offspring, origin, born, mothers))
+        bred = Proposal(key, offspring, origin, born, *(parents or (None, None)))
+        proposal = self._with_elite(state, bred)
         return self._with_opponent(state, proposal)
 
     def _with_opponent(self, state: EvolutionState, proposal: Proposal) -> Proposal:
@@ -103,12 +105,14 @@ class Evolution:
             first = jnp.where(children, leaf[:count], old[:count])
             return leaf.at[:count].set(first)
 
+        own, mothers, fathers = _own(state), proposal.mothers, proposal.fathers
         return dataclasses.replace(
             proposal,
             offspring=jax.tree.map(kept, proposal.offspring, state.genomes),
             origin=kept(proposal.origin, state.origin),
             born=kept(proposal.born, state.born),
-            mothers=None if proposal.mothers is None else kept(proposal.mothers, _own(state)),
+            mothers=None if mothers is None else kept(mothers, own),
+            fathers=None if fathers is None else kept(fathers, jnp.full_like(own, NO_FATHER)),
         )
 
     def _again(self, state: EvolutionState) -> tuple[int, jax.Array]:
@@ -154,7 +158,7 @@ class Evolution:
         fitness = self._fitness(pool.genomes, pool.terms, generation)
         again, now = self._again(state)
         survival = Survival(self.config, self.variation, now if again else None, self._stay(state))
-        grown, mothers = survival.survivors(state, proposal, pool, fitness, evaluation.terms)
+        grown, kept = survival.survivors(state, proposal, pool, fitness, evaluation.terms)
         planted = self._plant(state, proposal, evaluation, generation)
         state = choose(seeding, _without_key(planted), _without_key(grown))
         was_forced = state.forced
@@ -163,10 +167,22 @@ class Evolution:
         state = dataclasses.replace(state, normal=normal)
         state = decided(self.config, state)
         state = restarted(self.config.restart, state, complete=~self._seeding(state))
-        logged = None
-        if self.config.lineage and mothers is not None:
-            logged = jnp.where(seeding, NO_MOTHER, mothers)
-        return state, metrics(self.config, state, evaluation, was_forced, logged)
+        mothers, fathers = self._logged(proposal, kept, seeding)
+        return state, metrics(self.config, state, evaluation, was_forced, mothers, fathers)
+
+    def _logged(
+        self, proposal: Proposal, kept: jax.Array, seeding: jax.Array
+    ) -> tuple[jax.Array | None, jax.Array | None]:
+        """Return the parents' places [P] of the population, as metrics have them.
+
+        kept: [P] places of the population among the old and the offspring.
+        """
+        if not self.config.lineage or proposal.mothers is None or proposal.fathers is None:
+            return None, None
+        own = jnp.arange(self.config.population)
+        mothers = jnp.append(own, proposal.mothers)[kept]
+        fathers = jnp.append(jnp.full_like(own, NO_FATHER), proposal.fathers)[kept]
+        return jnp.where(seeding, NO_MOTHER, mothers), jnp.where(seeding, NO_FATHER, fathers)
 
     @property
     def _strategy(self) -> SeparableCma:
@@ -234,8 +250,8 @@ class Evolution:
 
     def _offspring(
         self, key: jax.Array, state: EvolutionState, seeding: jax.Array
-    ) -> tuple[object, jax.Array, jax.Array | None]:
-        """Return genomes [M, ...], their origins and their mothers' places [M].
+    ) -> tuple[object, jax.Array, Parents | None]:
+        """Return genomes [M, ...], their origins and their parents' places [M].
 
         The genomes are the unevaluated initial population, forced offspring, or children.
         """
@@ -246,7 +262,7 @@ class Evolution:
         known = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
         first = (state.generation < 0) & (places < self.config.population)
         initial = choose(first, known, created)
-        bred, child_origin, of_child = self._children(key_children, state)
+        bred, child_origin, parents = self._children(key_children, state)
         mutants, forced_origin, of_mutant = forced(
             keys_forced[1:], self.config, self.variation, state, created
         )
@@ -256,15 +272,17 @@ class Evolution:
 
         genomes = pick(initial, mutants, bred)
         origin = pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
-        if not self.config.follows or of_child is None:
+        if not self.config.follows or parents is None:
             return genomes, origin, None
+        (mothers, fathers), none = parents, jnp.full_like(origin, NO_FATHER)
         of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NO_MOTHER, of_mutant)
-        return genomes, origin, pick(jnp.full_like(origin, NO_MOTHER), of_mutant, of_child)
+        mothers = pick(jnp.full_like(origin, NO_MOTHER), of_mutant, mothers)
+        return genomes, origin, (mothers, pick(none, none, fathers))
 
     def _children(
         self, key: jax.Array, state: EvolutionState
-    ) -> tuple[object, jax.Array, jax.Array | None]:
-        """Return genomes drawn from the distribution, or bred, with their origins and mothers."""
+    ) -> tuple[object, jax.Array, Parents | None]:
+        """Return genomes drawn from the distribution, or bred, with their origins and parents."""
         if state.normal is None:
             return children(key, self.config, self.variation, state)
         count = self.config.offspring

@@ -8,15 +8,18 @@ import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.evolution.breeding import SequentialBreeding, parents, proportional_parents
-from mjxgait.evolution.state import EvolutionState, Origin
+from mjxgait.evolution.state import NO_FATHER, EvolutionState, Origin
 from mjxgait.evolution.variation import Variation
 from mjxgait.types import choose
+
+Parents = tuple[jax.Array, jax.Array]
+"""Places [M] of mothers and fathers in the population; see `Proposal`."""
 
 
 def children(
     key: jax.Array, config: EvolutionConfig, variation: Variation, state: EvolutionState
-) -> tuple[object, jax.Array, jax.Array | None]:
-    """Return genomes [M, ...], origins and mothers' places; no places in sequential breeding."""
+) -> tuple[object, jax.Array, Parents | None]:
+    """Return genomes [M, ...], origins and parents' places; no places in sequential breeding."""
     count = config.offspring
     if config.pool == "growing" or config.unique_children:
         bred, of_two = SequentialBreeding(config, variation).children(key, state.genomes)
@@ -40,7 +43,8 @@ def children(
         ~crosses & (config.mutation_rate > 0)
     )
     origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
-    return choose(mutates, mutated, child), origin, mothers
+    both = mothers, jnp.where(crosses, fathers, NO_FATHER)
+    return choose(mutates, mutated, child), origin, both
 
 
 def forced(

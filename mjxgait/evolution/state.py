@@ -14,6 +14,8 @@ from mjxgait.types import Evaluation, pytree
 
 NO_MOTHER = -1
 """Mother's place of an individual without a mother, or with an unknown one."""
+NO_FATHER = -1
+"""Father's place of an individual with one parent or none."""
 
 
 class Origin(IntEnum):
@@ -76,11 +78,13 @@ class GenerationMetrics:
     """Metrics of a generation: scalars except best_terms [F] and best_outcome [O].
 
     best_terms, best_outcome: mean over the trials of the best individual. unique: different
-    genomes. spread: standard deviation over the population, in the units of each array of the genome:
-    mean over an array's genes, then over the arrays. failures: number of the offspring's episodes
-    that ended early. mothers: [P] places of the population, or of its mothers, in the generation
-    before; None where that is not recorded. level: of the next generation's trials; None without a
-    curriculum.
+    genomes. spread: standard deviation over the population, in the units of each array of the
+    genome: mean over an array's genes, then over the arrays. failures: number of the offspring's
+    episodes that ended early. mothers: [P] places of the population, or of its mothers, in the
+    generation before; fathers: [P] places there of the fathers of those born in this generation,
+    else
+    `NO_FATHER`; None where that is not recorded. level: of the next generation's trials; None
+    without a curriculum.
     """
 
     generation: jax.Array
@@ -101,6 +105,7 @@ class GenerationMetrics:
     best_terms: jax.Array
     best_outcome: jax.Array
     mothers: jax.Array | None = None
+    fathers: jax.Array | None = None
     level: jax.Array | None = None
 
 
@@ -109,7 +114,8 @@ class Proposal:
     """Offspring that a generation submits for evaluation.
 
     key: of the next generation. offspring: leaves [M, ...]; origin, born: [M]. mothers: [M] places
-    of their first parents, or `NO_MOTHER`; None where that is not recorded.
+    of their first parents, or `NO_MOTHER`; fathers: [M] of their second, or `NO_FATHER`; None where
+    that is not recorded.
     """
 
     key: jax.Array
@@ -117,6 +123,7 @@ class Proposal:
     origin: jax.Array
     born: jax.Array
     mothers: jax.Array | None = None
+    fathers: jax.Array | None = None
 
 
 def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:
@@ -145,6 +152,7 @@ def metrics(
     evaluation: Evaluation,
     forced: jax.Array,
     mothers: jax.Array | None,
+    fathers: jax.Array | None,
 ) -> GenerationMetrics:
     """Compute the metrics of a sorted state and the evaluation that led to it.
 
@@ -175,6 +183,7 @@ def metrics(
         best_terms=jnp.mean(state.terms[0], axis=0),
         best_outcome=jnp.mean(state.outcome[0], axis=0),
         mothers=mothers,
+        fathers=fathers,
     )
 
 

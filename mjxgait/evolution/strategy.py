@@ -127,7 +127,8 @@ class SeparableCma:
         length = jnp.linalg.norm(step_path)
         step = normal.step * jnp.exp(rate.c_step / rate.damping * (length / rate.length - 1))
 
-        # While the step grows fast, the other path would only lengthen the variance in its direction.
+        # While the step grows fast, the other path would only lengthen the variance in its
+        # direction.
         settled = (
             length / jnp.sqrt(1 - kept ** (2 * (updates + 1)))
             < (1.4 + 2 / (jnp.sum(free) + 1)) * rate.length

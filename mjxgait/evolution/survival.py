@@ -112,7 +112,7 @@ def together(old: Tree, new: Tree) -> Tree:
 
 
 def _new_first(old: object, new: object) -> jax.Array:
-    """Return for each of both [P + M] whether it is the first of its kind, the new before the old."""
+    """Return for each of both [P + M] whether it is the first of its kind, the new first."""
     return jnp.roll(first_occurrence(together(new, old)), len(jax.tree.leaves(old)[0]))
 
 
@@ -136,8 +136,8 @@ class Survival:
         pool: Pool,
         fitness: jax.Array,
         verdicts: jax.Array,
-    ) -> tuple[EvolutionState, jax.Array | None]:
-        """Return the P best of a pool without duplicates, and their mothers' places.
+    ) -> tuple[EvolutionState, jax.Array]:
+        """Return the P best of a pool without duplicates, and their places [P] in it.
 
         In a forced generation, offspring that are fit enough go before the old.
 
@@ -165,14 +165,11 @@ class Survival:
         kept = jnp.lexsort((-fitness, -tier))[: config.population]
         kept = kept[jnp.argsort(-fitness[kept], stable=True)]
         admitted_now = jnp.where(state.forced, jnp.sum(taken_in[kept]), 0)
-        grown = dataclasses.replace(
+        survived = dataclasses.replace(
             state,
             **vars(jax.tree.map(lambda leaf: leaf[kept], pool)),
             fitness=fitness[kept],
             family=None if family is None else family[kept],
             refreshed=(state.refreshed + admitted_now).astype(jnp.int32),
         )
-        if proposal.mothers is None:
-            return grown, None
-        own = jnp.arange(config.population)
-        return grown, jnp.append(own, proposal.mothers)[kept]
+        return survived, kept

@@ -94,8 +94,8 @@ def first_genomes(
 def settings_of_ancestors(creature: Creature, config: Config) -> Config:
     """Return the settings of a run's ancestors with the first seed.
 
-    They are the creature's for that task, with genomes and physics of the run. A skill of the run is
-    evolved by its own effectors.
+    They are the creature's for that task, with genomes and physics of the run. A skill of the run
+    is evolved by its own effectors.
 
     Raises:
       UserError: the task is unknown, or does not fit.

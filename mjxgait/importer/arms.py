@@ -25,7 +25,7 @@ LEVEL = 0.1
 BEND, TURN = 0.05, 0.003
 """Resistance of an elbow, which rests a little bent, and of the shoulder to hanging."""
 TILTS = np.radians([0.0, 8.0, 16.0, 24.0, 32.0, 40.0])
-"""Angles from the vertical, outwards, at which an arm hangs, tried until it is clear of the rest."""
+"""Angles from the vertical, outwards, of a hanging arm, tried until it is clear of the rest."""
 CLEAR, UPPER = 0.01, 0.3
 """Least distance of an arm from the rest, in shoulder heights; share of its length, from the
 shoulder on, that may touch."""

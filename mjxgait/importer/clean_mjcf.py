@@ -102,8 +102,9 @@ def _include(tree: ET.Element, path: Path, places: Places, count: list[int]) -> 
             count[0] += 1
             if found is None or count[0] > MOST_INCLUDES:
                 raise UserError(
-                    f'{path}: <include file="{reference[:200]}"> is missing, outside of the model\'s folder, or one too many; '
-                    "put it beside the model or name its folder with --search"
+                    f'{path}: <include file="{reference[:200]}"> is missing, outside of the '
+                    "model's folder, or one too many; put it beside the model or name "
+                    "its folder with --search"
                 )
             inner = parse_xml(found)
             _include(inner, found, places, count)
@@ -167,7 +168,8 @@ def _drop_inner(tree: ET.Element, notes: Notes) -> None:
             total *= max(copies[0], 1.0) if copies else MOST_COPIES + 1
             if total > MOST_COPIES:
                 raise UserError(
-                    f'<replicate count="{child.get("count", "")[:20]}"> is more than a creature needs; write its parts out'
+                    f'<replicate count="{child.get("count", "")[:20]}"> is more than a creature '
+                    "needs; write its parts out"
                 )
 
 

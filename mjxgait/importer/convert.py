@@ -87,7 +87,7 @@ class Imported:
 
 
 def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
-    """Import a creature from an MJCF, URDF or xacro file, or from a skeleton (BVH, skinned GLB).
+    """Import a creature from a model (MJCF, URDF, xacro) or a skeleton (BVH, skinned GLB or FBX).
 
     path: of the file; or `robot:NAME`, a robot of the package robot_descriptions.
 
@@ -128,7 +128,14 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     model = _compiled(source, choices, notes)
     up = source.up.value if source.up else choices.up
     anatomy = find_anatomy(
-        model, source.coupled, choices.keep, choices.freeze, up, notes, source.limbs
+        model,
+        source.coupled,
+        choices.keep,
+        choices.freeze,
+        up,
+        notes,
+        source.limbs,
+        source.swings,
     )
     if source.up:
         notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
@@ -172,7 +179,7 @@ def _compiled(source: Source, choices: ImportChoices, notes: Notes) -> mujoco.Mj
 
 
 def _balance(best: Candidate, source: Source, root: str, planar: bool) -> None:
-    """Set how the body balances and steps, and how arms swing; refuse one that lies on the floor."""
+    """Set how the body balances, steps and swings its arms; refuse one that lies on the floor."""
     if best.held.height < 0:
         raise UserError(
             f'"{root}" lies on the floor, and all of it that is not a foot falls through: this has '
@@ -186,7 +193,7 @@ def _balance(best: Candidate, source: Source, root: str, planar: bool) -> None:
     if source.bones:
         step_if_narrow(body, best.q, best.drive, best.notes)
     arms = {name for name, arm in zip(body.names, body.arms, strict=True) if arm}
-    swing_arms(body, best.drive, source.swings | arms, best.notes)
+    swing_arms(body, best.drive, arms, best.notes)
 
 
 def _name(path: Path, choices: ImportChoices) -> str:

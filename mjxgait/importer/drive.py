@@ -31,8 +31,8 @@ QUICKNESS = 5.0
 A slower joint cannot follow a stride.
 """
 SPRAWL = 2.0
-"""Factor on a foot's distance beside a hinge, where that is more than the hip height: how far out the
-weight acts on a sprawling leg. The hinges of upright legs are within half a hip height.
+"""Factor on a foot's distance beside a hinge, where that is more than the hip height: how far out
+the weight acts on a sprawling leg. The hinges of upright legs are within half a hip height.
 """
 SWING = 0.35
 """rad, amplitude at which the torque limit must swing a joint's own inertia at that frequency."""

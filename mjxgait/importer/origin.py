@@ -8,6 +8,7 @@ from pathlib import Path
 import tomli_w
 
 from mjxgait.animation.clips.clip import read_bytes
+from mjxgait.animation.clips.fbx import FBX
 from mjxgait.config.tables import STRICT, build
 from mjxgait.creature import Creature
 from mjxgait.creature.creature import ORIGIN
@@ -15,8 +16,8 @@ from mjxgait.creature.settings import RigSettings
 from mjxgait.errors import UserError
 from mjxgait.files import check_tree
 
-KIND = ".glb"
-"""End of files that a walk can be put onto."""
+KINDS = (".glb", FBX)
+"""Ends of files that a walk can be put onto."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,12 +38,12 @@ class Found:
 
 
 def origin_files(path: Path, rig: RigSettings) -> dict[str, str]:
-    """Return the text of `character.toml` by its name; empty for what is no character in a GLB file.
+    """Return the text of `character.toml` by its name; empty unless it is a character.
 
     It is a file of its own, because the creature's digest must not depend on where its file lies.
     """
     place = str(path.resolve())
-    if not rig.bones or path.suffix.lower() != KIND or not place.isprintable():
+    if not rig.bones or path.suffix.lower() not in KINDS or not place.isprintable():
         return {}
     about = "# The file that `mjxgait export` puts the walk onto.\n"
     origin = Origin(place, digest_of(path))
@@ -64,7 +65,7 @@ def find_character(creature: Creature, run: Path) -> Found:
       UserError: `character.toml` is damaged.
     """
     rig = creature.settings.rig
-    if not rig.bones or not rig.file.lower().endswith(KIND):
+    if not rig.bones or not rig.file.lower().endswith(KINDS):
         return Found(None)
     if ORIGIN not in creature.files:
         return Found(

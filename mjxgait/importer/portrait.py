@@ -48,8 +48,8 @@ def facts(creature: Creature, held: Held) -> list[str]:
         else []
     )
     return [
-        f"{creature.name}: {creature.frame.mass:.3g} kg, hip height {creature.frame.hip_height:.3g} m, body "
-        f"length {creature.frame.body_length:.3g} m",
+        f"{creature.name}: {creature.frame.mass:.3g} kg, hip height "
+        f"{creature.frame.hip_height:.3g} m, body length {creature.frame.body_length:.3g} m",
         f"joints: {len(names)}, feet: {', '.join(creature.feet.names)}",
         f"it {state} for 2 s: upright {held.up:.2f}, height {held.height:.2f} of the start, joints "
         f"sag {held.sag:.3f} rad{touched}",

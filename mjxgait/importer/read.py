@@ -51,7 +51,8 @@ def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:
             clean_urdf(source, path, places, notes)
         case other:
             raise UserError(
-                f"{path}: begins with <{other[:40]}>; a model file begins with <mujoco> (MJCF) or <robot> (URDF)"
+                f"{path}: begins with <{other[:40]}>; a model file begins with <mujoco> (MJCF) or "
+                "<robot> (URDF)"
             )
     return source
 

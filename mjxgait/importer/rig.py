@@ -121,7 +121,7 @@ class Plan:
 
     @cached_property
     def on_limbs(self) -> list[bool]:
-        """Whether each bone belongs to a limb, or to what hangs on one; tails and bellies do not."""
+        """Whether each bone belongs to a limb or hangs on one; tails and bellies do not."""
         return self._below(set(self.limbs))
 
     @cached_property

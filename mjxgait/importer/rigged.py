@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.animation.clips.clip import Rig, written
+from mjxgait.animation.clips.fbx import FBX, rig_of_fbx
 from mjxgait.animation.clips.read_glb import rig_of_glb
 from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.errors import UserError, listed
@@ -20,7 +21,11 @@ from mjxgait.importer.rig_hinges import Hinge, hinges_of
 from mjxgait.importer.rig_radii import SKINNED, THICK, radii_of, slimmer
 from mjxgait.importer.source import Source
 
-RIGS: Mapping[str, Callable[[Path], Rig]] = {".bvh": rig_of_bvh, ".glb": rig_of_glb}
+RIGS: Mapping[str, Callable[[Path], Rig]] = {
+    ".bvh": rig_of_bvh,
+    ".glb": rig_of_glb,
+    FBX: rig_of_fbx,
+}
 UP, OTHER, SURER = "y", "z", 1.5
 """Default up axis; the other candidate; and the least ratio of the limbs' descent to prefer it."""
 DENSITY = 1000.0
@@ -32,7 +37,7 @@ METRES, CENTIMETRES = 4.0, 400.0
 
 
 def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> Source:
-    """Return the model of a BVH or GLB file's skeleton.
+    """Return the model of the skeleton in a BVH, GLB or FBX file.
 
     Args:
       up: the axis that points up, if the user states it. height: m, at rest.
@@ -61,26 +66,21 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
     bones = dict(zip(names, map(written, plan.rig.names), strict=True))
     limbs = {name for name, inside in zip(names, plan.on_limbs, strict=True) if inside}
     tree = _tree(plan, hinges, radii, names, notes)
-    swings = _swings(plan, hinges, names)
     if turned:
         arms = listed([names[bone] for bone in turned])
-        reason = "the skeleton rests with spread arms"
-        if swings:
-            options = " ".join(f"--keep {name}" for name in sorted(swings))
-            reason += f"; {options} lets them swing"
-        notes.guess(f"arms from {arms} down", "hang", "high", reason)
+        notes.guess(f"arms from {arms} down", "hang", "high", "the skeleton rests with spread arms")
     return Source(
         tree,
         up=upward,
         bones=bones,
         limbs=frozenset(limbs),
         turned={names[bone]: turn.as_matrix() for bone, turn in turned.items()},
-        swings=swings,
+        swings=_swings(plan, hinges, names),
     )
 
 
 def _swings(plan: Plan, hinges: list[list[Hinge]], names: list[str]) -> frozenset[str]:
-    """Names of the hinges by which arms swing ahead and back."""
+    """Names of the hinges by which arms swing ahead and back; a spread arm has none."""
     return frozenset(
         f"{names[bone]}_{hinge.name}"
         for bone, *_ in plan.arms.values()
@@ -134,7 +134,7 @@ def _check(path: Path, rig: Rig) -> None:
 def _upward(rig: Rig) -> Guess:
     """Up axis: glTF's, or the one along which the limbs come down to the floor."""
     if rig.metres is not None:
-        return Guess("up", UP, "high", "glTF has Y up")
+        return Guess("up", UP, "high", "as the file states")
     usual, other = (Plan("xyz".index(axis), rig).stands for axis in (UP, OTHER))
     if other > SURER * usual:
         return Guess(
@@ -153,7 +153,7 @@ def _measured(rig: Rig, up: int, height: float | None, notes: Notes) -> Rig:
         notes.guess("height", f"{height:g} m", "high", "as given")
         return rig.scaled(height / tall)
     if rig.metres is not None:
-        notes.guess("height", f"{rig.metres * tall:.3g} m", "high", "glTF counts in metres")
+        notes.guess("height", f"{rig.metres * tall:.3g} m", "high", "the file states its unit")
         return rig.scaled(rig.metres)
     unit, name = (
         (1.0, "metres")

@@ -47,8 +47,8 @@ class Source:
     missing: keys of unavailable meshes, each with its expected file; MJCF only.
     up: axis that points up, of a skeleton. bones: its bones by the body that is made of each.
     limbs: the bodies of its limbs, which alone may be legs; None for other models. turned: of each
-    body that hangs although the skeleton rests spread, the rotation [3, 3] from there. swings: names
-    of the joints by which arms swing.
+    body that hangs although the skeleton rests spread, the rotation [3, 3] from there. swings:
+    names of the joints by which arms swing.
     """
 
     tree: ET.Element
@@ -174,7 +174,8 @@ def load_mesh(
     if path is None:
         notes.change(
             f'mesh "{reference}" dropped',
-            "not found in the model's folder, its package or a search path (name more with --search)",
+            "not found in the model's folder, its package or a search path (name more with "
+            "--search)",
         )
         return None
     size = path.stat().st_size

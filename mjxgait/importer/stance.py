@@ -38,6 +38,8 @@ BENT, UPRIGHT = (0.75, 0.94), (0.965, 0.975)
 """Straightness of a leg without a cost, and that of a figure with arms."""
 MARGIN = 0.25
 """rad that a joint should keep from its limit."""
+LEVELLED = 0.5
+"""Share of the feet's difference in height that a tilt may leave."""
 NEUTRAL = 0.9
 """Straightness of a leg that cannot bend."""
 
@@ -49,9 +51,7 @@ def symmetric(q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray] | None) -> np
 
 def level(kinematics: KinematicModel, q: np.ndarray) -> None:
     """Tilt the trunk until the feet are level; a tilt that two feet leave open stays."""
-    lowest = np.array(
-        [sole[sole[:, 2].argmin()] for sole in kinematics.sole_points(*kinematics.pose(q))]
-    )
+    lowest = _lowest(kinematics, q)
     if len(lowest) < 2:
         return
     centred = lowest - lowest.mean(0)
@@ -65,9 +65,16 @@ def level(kinematics: KinematicModel, q: np.ndarray) -> None:
     axis = np.cross(up, [0.0, 0.0, 1.0])
     sine = float(np.linalg.norm(axis))
     half = np.arcsin(min(sine, 1.0)) / 2
-    kinematics.turn(
-        rotation(np.concatenate([[np.cos(half)], np.sin(half) * axis / max(sine, 1e-9)]))
-    )
+    tilt = rotation(np.concatenate([[np.cos(half)], np.sin(half) * axis / max(sine, 1e-9)]))
+    kinematics.turn(tilt)
+    if np.ptp(_lowest(kinematics, q)[:, 2]) > LEVELLED * np.ptp(lowest[:, 2]):
+        kinematics.turn(tilt.T)  # tilted, the feet would stand on other points, hardly more level
+
+
+def _lowest(kinematics: KinematicModel, q: np.ndarray) -> np.ndarray:
+    """Return the lowest point [feet, 3] of each foot in a pose [J]."""
+    soles = kinematics.sole_points(*kinematics.pose(q))
+    return np.array([sole[sole[:, 2].argmin()] for sole in soles])
 
 
 def drop(kinematics: KinematicModel, q: np.ndarray, sink: float = 0.0) -> None:

@@ -60,13 +60,13 @@ ENOUGH = 0.1
 """Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
 CROSSED, NEAR = 12.0, 0.667
-"""Weight of parts within each other, three times the default, of a character: its thick thighs, tail
-and chest are close. Weight of distance on one foot or two: what a longer episode adds to it must
-not outweigh them.
+"""Weight of parts within each other, three times the default, of a character: its thick thighs,
+tail and chest are close. Weight of distance on one foot or two: what a longer episode adds to it
+must not outweigh them.
 """
 SLIDES = 20.0
-"""Weight of feet that slide, twice the default, of characters on more than two feet: on a floor that
-gives at first touch a paw bears weight while it still moves.
+"""Weight of feet that slide, twice the default, of characters on more than two feet: on a floor
+that gives at first touch a paw bears weight while it still moves.
 """
 FLICKER, LEISURE = 3.0, 0.65
 """Weight of feet that lose the floor for moments, of characters on more than two feet: their mass
@@ -163,7 +163,8 @@ def four_feet(body: Traits) -> tuple[Settings, Choice]:
         if not body.skeleton:
             settings["controller"] = {"interpolation": body.steps_between_poses(WalkConfig().speed)}
             fitness["leniency"] = LENIENT
-            what += "; style counts little in short walks; cycles no shorter than an animal's of its mass"
+            what += "; style counts little in short walks"
+            what += "; cycles no shorter than an animal's of its mass"
     return settings, (what, "high", why)
 
 

@@ -1,5 +1,6 @@
 """Compilation of a cleaned model, in this process or in one with limited time and memory."""
 
+import copy
 import dataclasses
 import json
 import math
@@ -19,7 +20,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.errors import UserError
-from mjxgait.importer.meshes import convert
+from mjxgait.importer.meshes import convert, misfit, with_y_up
 from mjxgait.importer.source import leave_out
 from mjxgait.processes import python_command, safe_environment
 
@@ -28,6 +29,8 @@ SECONDS, GIGABYTES = 10.0, 2.0
 PATIENCE = 6.0
 """Seconds to wait per second of processor time, because other programs may use the cores."""
 MOST_REPAIRS = 40
+FITS = 0.5
+"""Share of the meshes' distance from the joints below which a turn of them is an improvement."""
 OPTIONAL = ("actuator", "sensor", "keyframe", "tendon", "contact")
 """Sections that are dropped if the model does not compile with them."""
 UNKNOWN_ATTRIBUTE = re.compile(r"unrecognized attribute: '([^']+)'.*?Element '([^']+)'", re.DOTALL)
@@ -54,8 +57,8 @@ def compile_apart(
     """
     order = pickle.dumps((ET.tostring(tree), assets, missing, seconds, gigabytes))
     slow = UserError(
-        f"MuJoCo did not compile the model within {seconds:g} s; simplify its meshes, take out what "
-        "is not its body, or allow more with --seconds"
+        f"MuJoCo did not compile the model within {seconds:g} s; simplify its meshes, take out "
+        "what is not its body, or allow more with --seconds"
     )
     try:
         done = subprocess.run(
@@ -86,14 +89,31 @@ def compile_here(
 ) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
     """Return the compiled model, and the changes needed to compile it with their reasons.
 
+    The up axis of COLLADA files counts only if links fit together better for it.
+
     Args:
       missing: meshes that are not in `assets`, see `leave_out`.
 
     Raises:
       UserError: with MuJoCo's own words.
     """
-    repairs, assets = _Repairs(tree, dict(missing or {})), dict(assets)
-    convert(assets, repairs.leave_out)
+    lying = with_y_up(assets)
+    as_written = _compiled(copy.deepcopy(tree), assets, missing or {}, ())
+    if not lying:
+        return as_written
+    upright, changes = _compiled(tree, assets, missing or {}, lying)
+    if misfit(upright) < FITS * misfit(as_written[0]):
+        what = f"{len(lying)} meshes turned so that their y is up"
+        return upright, [(what, "as their files state; so they reach the joints"), *changes]
+    return as_written
+
+
+def _compiled(
+    tree: ET.Element, assets: dict[str, bytes], missing: dict[str, str], upright: Collection[str]
+) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
+    """Compile a tree, which is changed where it must be; see `compile_here` and `convert`."""
+    repairs, assets = _Repairs(tree, dict(missing)), dict(assets)
+    convert(assets, repairs.leave_out, upright)
     for _ in range(MOST_REPAIRS):
         try:
             spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=assets)

@@ -43,8 +43,8 @@ def creature_toml(
     }
     about = f"imported from {rig.file}: {len(joints)} joints"
     lines = [
-        f"# Made by `mjxgait import` from {rig.file}. The words after each guess say how sure it is; "
-        "change what is wrong.",
+        f"# Made by `mjxgait import` from {rig.file}. The words after each guess say how sure it "
+        "is; change what is wrong.",
         "# `mjxgait check` draws it. Mass, inertias, joint axes and positions in creature.xml are "
         f"those of {rig.file}.",
         "[creature]",

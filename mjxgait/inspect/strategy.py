@@ -38,7 +38,7 @@ AIRBORNE = 0.1
 SHORTENS, ARCHES = 0.25, -0.5
 """Least change of length over length, and largest correlation of length and height."""
 DRAGS, CARRIED = 0.5, 0.1
-"""Least share of the time on the ground of a part that drags, and largest of one that is carried."""
+"""Least share of the time on the ground of a part that drags; largest of one that is carried."""
 ROCKS = 5.0
 """Least tilt to and fro in degrees (root mean square) of a part that rocks."""
 
@@ -160,8 +160,7 @@ def _on_land(motion: Motion) -> str:
 
 
 def turning(motion: Motion) -> tuple[np.ndarray, float]:
-    """Return the largest part's net turns per second [3] about the world's axes, and its steadiness.
-
+    """Return the largest part's net turns per second [3] about the world's axes, and how steady.
     The steadiness is the net turning over all turning, 0 to 1.
     """
     change = motion.turn[1:] @ motion.turn[:-1].transpose(0, 2, 1)

@@ -38,8 +38,8 @@ def _check_options(creature: Creature, config: Config) -> None:
     kind = known_task(task)
     if config.rollout.moves and kind and "follow" not in kind.tables:
         raise UserError(
-            f"{name}: rollout.moves moves the lights of followers, and the task {task} has none; leave "
-            "it out"
+            f"{name}: rollout.moves moves the lights of followers, and the task {task} has none; "
+            "leave it out"
         )
     if config.evolution.family < 1 and config.evolution.islands.count > 1:
         raise UserError(
@@ -55,8 +55,8 @@ def _check_options(creature: Creature, config: Config) -> None:
         wanted = config.controller.key_poses * len(creature.joints.names)
         if len(around) != wanted:
             raise UserError(
-                f"controller.around has {len(around)} angles; {config.controller.key_poses} key poses "
-                f"of {name} have {wanted}; --gait auto begins with no poses that were drawn"
+                f"controller.around has {len(around)} angles; {config.controller.key_poses} key "
+                f"poses of {name} have {wanted}; --gait auto begins with no poses that were drawn"
             )
 
 
@@ -87,8 +87,8 @@ def _check_contest(name: str, config: Config) -> None:
             )
     if config.evolution.islands.count > 1:
         raise UserError(
-            f"{name}: each island has its own opponents, so those that migrate would meet another; take "
-            "--evolution.islands.count 1, or --runs for several runs side by side"
+            f"{name}: each island has its own opponents, so those that migrate would meet another; "
+            "take --evolution.islands.count 1, or --runs for several runs side by side"
         )
 
 
@@ -144,13 +144,13 @@ def _check_skills(name: str, config: Config) -> None:
     least = 2 * count if "follow" in skills else count
     if config.rollout.starts < least or config.rollout.starts % count:
         raise UserError(
-            f"{name}: rollout.starts = {config.rollout.starts}, and the {count} skills of {task} share the "
-            f"trials equally; take a multiple of {count} from {least} on"
+            f"{name}: rollout.starts = {config.rollout.starts}, and the {count} skills of {task} "
+            f"share the trials equally; take a multiple of {count} from {least} on"
         )
     if config.rollout.promote < 1:
         raise UserError(
-            f"{name}: rollout.promote = {config.rollout.promote:g} would choose by the first skill alone; "
-            f"take --rollout.promote 1 for {task}"
+            f"{name}: rollout.promote = {config.rollout.promote:g} would choose by the first skill "
+            f"alone; take --rollout.promote 1 for {task}"
         )
     own: Any = config.controller
     if own.skill:

@@ -54,7 +54,7 @@ def contest_of(creature: Creature) -> Contest | None:
 
 
 class Opponent:
-    """The opponents of `S` simulations, each with its own memory. Their joints are not disturbed."""
+    """The opponents of `S` simulations, each with its own memory; their joints are undisturbed."""
 
     def __init__(self, contest: Contest, controller: ReferenceController, count: int) -> None:
         self.contest, self.controller = contest, controller
@@ -72,7 +72,7 @@ class Opponent:
     def torque(
         self, rows: np.ndarray, k: int, qpos: np.ndarray, xpos: np.ndarray, xmat: np.ndarray
     ) -> np.ndarray:
-        """Return the torques [rows, J] in N·m at control step k; arrays [rows, ...] of the state."""
+        """Return the torques [rows, J] in N·m at control step k, from arrays [rows, ...]."""
         if k % self.controller.every == 0:
             self._act(rows, self._senses(qpos, xpos, xmat))
         torque: np.ndarray = self.command[rows]

@@ -65,7 +65,7 @@ class PartOverlap:
         self._usual = _depths(self.model, self._data, creature.stand_qpos) if excused else {}
 
     def depths(self, qpos: np.ndarray) -> dict[tuple[int, int], float]:
-        """Return the depth in m of each pair of geoms that overlap in a pose [nq] more than usual."""
+        """Return the depth in m of each pair of geoms that overlap unusually in a pose [nq]."""
         found = _depths(self.model, self._data, qpos)
         more = {geoms: depth - self._usual.get(geoms, 0.0) for geoms, depth in found.items()}
         return {geoms: depth for geoms, depth in more.items() if depth > 0}

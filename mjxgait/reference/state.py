@@ -130,7 +130,7 @@ ADDED: Mapping[str, Sense] = {
     "light": lambda creature, state: state.light,
     "bar_distance": lambda creature, state: _left(state, state.bar),
 }
-"""Observations added by shipped tasks (docs/reference/hop.md, docs/reference/limbo.md, docs/reference/follow.md)."""
+"""Observations added by shipped tasks (hop.md, limbo.md, follow.md in docs/reference/)."""
 FOOT_SENSES = ("foot_height", "contact", "foot_place")
 """Observations that need `foot_height` or `foot_pos`."""
 

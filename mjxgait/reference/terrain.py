@@ -1,5 +1,4 @@
-"""Ground of the reference simulator: NumPy heights, a MuJoCo height field (docs/reference/ground.md).
-
+"""Ground of the reference simulator: heights in NumPy, a MuJoCo field (docs/reference/ground.md).
 It shares only the specification of the ground with the one used in evolution.
 """
 

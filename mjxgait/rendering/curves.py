@@ -237,7 +237,7 @@ def _label_generations(axes: Axes, generation: np.ndarray) -> None:
 
 
 def draw_stress(drawing: Figure, found: Stress, subject: str = "") -> None:
-    """Draw the share of starts that passed each trial; dark if sufficient. subject: see `titled`."""
+    """Draw the share of starts that passed each trial; dark if enough. subject: see `titled`."""
     axes = drawing.add_subplot()
     names = [trial.name for trial in found.trials]
     shares = [trial.share for trial in found.trials]

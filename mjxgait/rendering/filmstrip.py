@@ -165,7 +165,8 @@ def draw_front(drawing: Figure, kept: Sequence[Kept]) -> None:
         xlabel="key poses moved by, degrees (root mean square)",
         ylabel="disturbed starts that stay up",
         ylim=(-0.05, 1.08),
-        title=f"{kept[0].walk.creature.title}: what the original costs; filled circles are certified",
+        title=f"{kept[0].walk.creature.title}: what the original costs; "
+        "filled circles are certified",
     )
     above.yaxis.set_major_formatter("{x:.0%}")
     for axes, one in zip(strips, kept, strict=True):

@@ -65,7 +65,7 @@ class Camera:
         return (points - self.centre) @ self.axes[2]
 
     def offsets(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return how far pixel middles lie to the right [columns] and up [rows] of the centre, m."""
+        """Return how far in m pixel middles are right [columns] of and above [rows] the centre."""
         return (
             (columns + 0.5 - self.width / 2) / self.scale,
             -(rows + 0.5 - self.height / 2) / self.scale,

@@ -1,4 +1,4 @@
-"""Champions side by side: what each does, in a word and in numbers, and a sheet of pictures of all."""
+"""Champions side by side: what each does, in a word and in numbers, and pictures of all."""
 
 import dataclasses
 from collections.abc import Iterator, Sequence

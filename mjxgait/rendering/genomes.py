@@ -166,7 +166,7 @@ def bodies_of(run: Path, champion: Champion) -> Row:
     individuals if the log has no mothers.
     """
     latest = read_snapshot(run)
-    line = mothers_line(latest.lines, latest.generation, _place(latest, champion))
+    line = mothers_line(latest.lines, latest.generation, place_in(latest, champion))
     descend = len(line) > 1
     places = line if descend else dict.fromkeys(latest.generations, 0)
     known = [generation for generation in latest.generations if generation in places]
@@ -188,8 +188,8 @@ def draw_bodies(drawing: Figure, row: Row, subject: str = "") -> None:
     drawing.suptitle(titled(subject, said), fontsize=10)
 
 
-def _place(population: Snapshot, champion: Champion) -> int:
-    """Champion's place in the population; 0, the best, if it is absent."""
+def place_in(population: Snapshot, champion: Champion) -> int:
+    """Return the champion's place in the population; 0, the best, if it is absent."""
     genes = [
         (found == champion.genome[name]).reshape(len(found), -1).all(1)
         for name, found in population.genomes.items()

@@ -66,7 +66,7 @@ def distances(
 
 
 def normals(kind: int, size: np.ndarray, points: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return the normals [n, 3] at points [n, 3] m where rays enter a primitive; see `distances`."""
+    """Return the normals [n, 3] of a primitive where rays enter it, at points [n, 3] m."""
     match kind:
         case GEOM.mjGEOM_SPHERE:
             return points / size[0]

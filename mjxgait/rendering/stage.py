@@ -311,8 +311,7 @@ class Stage:
         return offset
 
     def _path(self, participant: Participant) -> np.ndarray:
-        """Path [frames, 3] m of the middle: ahead of the start, to its left, and the ground's height.
-
+        """Path [frames, 3] m of the middle: ahead of the start, to its left, the ground's height.
         For a swimmer its rise instead of that height.
         """
         steps = [participant.frame(frame * self.time_step) for frame in range(self.frames)]

@@ -251,8 +251,8 @@ def _import_av(path: Path) -> ModuleType:
         import av
     except ImportError:
         raise UserError(
-            f"{path}: {path.suffix[1:].upper()} needs an extra: {install_command('video')}; WebP and "
-            "GIF need none"
+            f"{path}: {path.suffix[1:].upper()} needs an extra: {install_command('video')}; WebP "
+            "and GIF need none"
         ) from None
     return av
 

@@ -12,14 +12,13 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjxgait.certification import outdated, read_certificate, verdict_of
+from mjxgait.certification import Lack, NoCertificate, certificate_state
 from mjxgait.certification.acceptance import how_simulated
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.controllers.sims_brain.reference_body import THEIRS, grow, opponent_genome
 from mjxgait.creature import Creature
-from mjxgait.errors import UserError, clause
 from mjxgait.reference.layout import RADIUS, Ground, StartFrame, start_frame
 from mjxgait.reference.measure import Recording, measure, stride_starts
 from mjxgait.reference.outcome import Trajectory
@@ -292,19 +291,15 @@ def doubt(run: Path, walk: Walk) -> str:
     walk: of this champion, freshly simulated.
     """
     reasons = [f"it falls after {walk.fell:.1f} s"] if np.isfinite(walk.fell) else []
-    try:
-        document = read_certificate(run / CERTIFICATE)
-    except UserError as error:
-        return f"Not certified: {'; '.join([*reasons, str(error)])}"
-    if document is None:
-        reasons.append(f"it has not been examined, which {command('certify', run, run=run)} does")
-    elif old := outdated(document, walk.champion, walk.creature):
-        reasons.append(clause(old))
-    elif (verdict := verdict_of(document)).certified:
+    state = certificate_state(run / CERTIFICATE, walk.champion, walk.creature)
+    if isinstance(state, NoCertificate):
+        way_out = f", which {command('certify', run, run=run)} does"
+        reasons.append(state.reason + (way_out if state.lack is Lack.MISSING else ""))
+    elif state.verdict.certified:
         return ""
-    elif failed := verdict.failed:
+    elif failed := state.verdict.failed:
         names = ", ".join(f"{c.number} {c.name}".strip() for c in failed)
         reasons.append(f"it fails {'criterion' if len(failed) == 1 else 'criteria'} {names}")
     else:
-        reasons.append(verdict.reservation or "its certificate has no criteria")
+        reasons.append(state.verdict.reservation or "its certificate has no criteria")
     return f"Not certified: {'; '.join(reasons)}"

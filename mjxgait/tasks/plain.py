@@ -23,8 +23,8 @@ class PlainTask(abc.ABC):
     """Base class for user-defined tasks (docs/guide/your-own-task.md).
 
     A subclass needs `counts`, the weight of each fitness term by name, and `evaluate`. Its own
-    statistics of an episode go into a `EpisodeStats` of its own. `Settings` is a frozen dataclass of
-    numbers that become keys of `[fitness]`. step: s. horizon: T, steps of a full episode. ends:
+    statistics of an episode go into a `EpisodeStats` of its own. `Settings` is a frozen dataclass
+    of numbers that become keys of `[fitness]`. step: s. horizon: T, steps of a full episode. ends:
     definition of a fall.
     """
 

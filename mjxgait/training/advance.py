@@ -13,7 +13,7 @@ import numpy as np
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.tasks.base import Task
 from mjxgait.training.experiment import Batch, Step, row_of
-from mjxgait.training.logs import MOTHERS, Line
+from mjxgait.training.logs import PARENTS, Line
 
 
 class Generations:
@@ -70,7 +70,8 @@ def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> Line
     line |= _named("term", task.terms, metrics.best_terms)
     line |= _named("outcome", task.outcomes, metrics.best_outcome)
     finite = {key: value if np.isfinite(value) else None for key, value in line.items()}
-    return finite if metrics.mothers is None else finite | {MOTHERS: metrics.mothers.tolist()}
+    parents = {name: getattr(metrics, name) for name in PARENTS}
+    return finite | {name: found.tolist() for name, found in parents.items() if found is not None}
 
 
 def followed(numbers: Mapping[str, np.ndarray]) -> dict[str, float]:

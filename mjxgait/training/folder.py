@@ -104,8 +104,8 @@ def _of_version(error: UserError, folder: Path) -> UserError:
     by = f"mjxgait {made}" if made else "an earlier mjxgait"
     reason = str(error).removeprefix(f"{folder / CONFIG}: ").partition(";")[0]
     return UserError(
-        f"{folder / CONFIG}: made by {by}; mjxgait {own} does not read its settings ({reason}); train it "
-        "anew, or read it with the version that made it"
+        f"{folder / CONFIG}: made by {by}; mjxgait {own} does not read its settings ({reason}); "
+        "train it anew, or read it with the version that made it"
     )
 
 

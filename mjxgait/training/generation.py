@@ -15,6 +15,7 @@ import numpy as np
 from mjxgait.config.schema import Config
 from mjxgait.evolution.evolution import Evolution
 from mjxgait.evolution.state import (
+    NO_FATHER,
     NO_MOTHER,
     EvolutionState,
     GenerationMetrics,
@@ -102,14 +103,17 @@ def with_migrants(sources: jax.Array, states: EvolutionState, proposals: Proposa
         guests, last = best[sources, rank % best.shape[1]], children[:, -count:]
         return children.at[:, -count:].set(choose(comes, guests, last))
 
-    mothers = proposals.mothers
+    mothers, fathers = proposals.mothers, proposals.fathers
     if mothers is not None:
         mothers = seated(mothers, jnp.full_like(states.origin, NO_MOTHER))
+    if fathers is not None:
+        fathers = seated(fathers, jnp.full_like(states.origin, NO_FATHER))
     return dataclasses.replace(
         proposals,
         offspring=jax.tree.map(seated, proposals.offspring, states.genomes),
         origin=seated(proposals.origin, states.origin),
         mothers=mothers,
+        fathers=fathers,
     )
 
 

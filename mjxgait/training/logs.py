@@ -14,8 +14,11 @@ from mjxgait.evolution.state import NO_MOTHER
 from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, write_text
 from mjxgait.training.disk import disk_errors
 
-MOTHERS = "mothers"
-"""Key in a log line: each individual's own place in the previous generation, or its mother's."""
+MOTHERS, FATHERS = "mothers", "fathers"
+"""Keys in a log line: each individual's own place in the previous generation, or its mother's; and
+its father's, of those that were born of two.
+"""
+PARENTS = (MOTHERS, FATHERS)
 
 
 Line = dict[str, Any]
@@ -40,6 +43,7 @@ class _Metrics:
     mean: Number | None
     forced: Flag
     mothers: list[int] = dataclasses.field(default_factory=list)
+    fathers: list[int] = dataclasses.field(default_factory=list)
 
 
 def read_metrics(path: Path) -> list[Line]:
@@ -51,14 +55,14 @@ def read_metrics(path: Path) -> list[Line]:
     lines = read_records(path, _Metrics)
     for number, line in enumerate(lines, 1):
         for name, value in line.items():
-            if not isinstance(value, int | float | None) and name not in (MOTHERS, "variant"):
+            if not isinstance(value, int | float | None) and name not in (*PARENTS, "variant"):
                 raise DamagedFile(f"{path}, line {number}: {name} is not a number; {TAKE_OUT}")
     return lines
 
 
 def columns(lines: Sequence[Line]) -> dict[str, np.ndarray]:
-    """Return each metric but `mothers` over the generations [G], NaN where it is missing."""
-    names = dict.fromkeys(name for line in lines for name in line if name != MOTHERS)
+    """Return each metric but those of parents over the generations [G], NaN where it is missing."""
+    names = dict.fromkeys(name for line in lines for name in line if name not in PARENTS)
     return {
         name: np.array([np.nan if line.get(name) is None else line[name] for line in lines])
         for name in names

@@ -24,6 +24,7 @@ from mjxgait.training.disk import disk_errors
 from mjxgait.training.examination import Examined, Examiner, Validation, why_ended
 from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Batch, Experiment, Step, build_experiment, one_row
+from mjxgait.training.family import drop_newborns, keep_newborns
 from mjxgait.training.folder import (
     BODY,
     CERTIFICATE,
@@ -45,7 +46,7 @@ from mjxgait.training.initial import (
     read_initial,
 )
 from mjxgait.training.lock import locked_run
-from mjxgait.training.logs import append_lines, read_metrics, truncate_metrics
+from mjxgait.training.logs import MOTHERS, append_lines, read_metrics, truncate_metrics
 from mjxgait.training.prescreen import prescreen_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.skill_runs import write_skill_runs
@@ -138,8 +139,14 @@ def _drop_after(begun: int, folder: Path, checkpoints: Checkpoints, screen: Scre
     if later := checkpoints.drop_after(begun):
         names = ", ".join(map(str, later))
         screen.say(f"Dropped the checkpoints after generation {begun}: {names}; they come anew.")
+    _forget(folder, begun)
+
+
+def _forget(folder: Path, generation: int) -> None:
+    """Remove what the logs and the family record hold of later generations."""
     with disk_errors(folder):
-        truncate_metrics(folder / METRICS, begun)
+        truncate_metrics(folder / METRICS, generation)
+        drop_newborns(folder, generation)
 
 
 def mend_champion(folder: Path, experiment: Experiment, state: EvolutionState) -> None:
@@ -247,8 +254,7 @@ def _evolve(
                     f"Generation {generation} is what the run ends with; what evolved beside its "
                     f"examination, up to generation {later}, is forgotten."
                 )
-            with disk_errors(folder):
-                truncate_metrics(folder / METRICS, generation)
+            _forget(folder, generation)
             reason = why_ended(generation, examined.certificate.margin)
             break
         if saves:
@@ -270,11 +276,14 @@ def _generation(
     lines, state = generations.advance(), generations.row()
     for line in lines:
         append_lines(folder / METRICS, [line])
+        if MOTHERS in line:
+            keep_newborns(folder, state)
         keep_best(folder, experiment, state)
         screen.generation(line, experiment.config)
     if lines and not state.seeded:
         screen.say(
-            f"The best fitness, {state.fitness[0]:.3f}, earns nothing: the population is drawn anew."
+            f"The best fitness, {state.fitness[0]:.3f}, earns nothing: the population is drawn "
+            "anew."
         )
     return state
 

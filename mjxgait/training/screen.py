@@ -147,7 +147,8 @@ class Screen(Output):
         if like := in_words(report):
             self.console.print(like)
         self.console.print(
-            "The margin is that of the tightest measure: 0 just passes, 1 is far from its threshold."
+            "The margin is that of the tightest measure: 0 just passes, 1 is far from its "
+            "threshold."
         )
 
     def report(self, folder: Path, why: str, last: Line, seconds: float, interrupted: bool) -> None:

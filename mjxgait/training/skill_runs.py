@@ -1,4 +1,4 @@
-"""Run folders that show single skills of a champion: films, pages, exports, examinations of each."""
+"""Run folders that each show one skill of a champion, to film, share, export and examine."""
 
 import dataclasses
 from pathlib import Path

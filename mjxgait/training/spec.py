@@ -151,7 +151,8 @@ def check_spec(creature: Creature, config: Config) -> None:
     """Refuse settings that give no program. Compiles and writes nothing.
 
     Raises:
-      UserError: see `make_spec`; or the controller reads an observation that the body does not have.
+      UserError: see `make_spec`; or the controller reads an observation that the body does not
+        have.
     """
     make_spec(creature, config).simulator()
 

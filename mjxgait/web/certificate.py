@@ -6,19 +6,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mjxgait.certification import (
+    Lack,
+    NoCertificate,
+    ValidCertificate,
     Verdict,
+    certificate_state,
     criteria_of,
-    outdated,
-    read_certificate,
     read_stress,
     stress_in_words,
-    verdict_of,
 )
 from mjxgait.certification.advice import ADVICE
 from mjxgait.certification.verdict import Document
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.errors import clause
+from mjxgait.errors import UserError
 from mjxgait.training.folder import CERTIFICATE, STRESS
 
 CHECK = (
@@ -37,17 +38,19 @@ def certificate_summary(
 ) -> str:
     """Return the verdict, the margin, and the measures with the least room, as a paragraph.
 
-    A champion without a valid certificate gets the reason. fell: s of its undisturbed walk, infinite
-    if it stays up.
+    A champion without a valid certificate gets the reason. fell: s of its undisturbed walk,
+    infinite if it stays up.
+
+    Raises:
+      UserError: the file is not a certificate.
     """
-    document = read_certificate(run / CERTIFICATE)
-    falls = [f"it falls after {fell:.1f} s"] if math.isfinite(fell) else []
-    if document is None:
-        return _uncertified([*falls, "it has not been examined"], "Examine it")
-    if reason := outdated(document, champion, creature):
-        return _uncertified([*falls, clause(reason)], "Examine it again")
-    verdict = verdict_of(document)
-    measures = [(c.skill, m) for c in criteria_of(document) for m in c.measures]
+    state = _state(run, creature, champion)
+    if isinstance(state, NoCertificate):
+        falls = [f"it falls after {fell:.1f} s"] if math.isfinite(fell) else []
+        way_out = "Examine it" if state.lack is Lack.MISSING else "Examine it again"
+        return _uncertified([*falls, state.reason], way_out)
+    verdict = state.verdict
+    measures = [(c.skill, m) for c in criteria_of(state.document) for m in c.measures]
     nearest = sorted(measures, key=lambda pair: pair[1].margin)[:TIGHTEST]
     listed = "; ".join(
         f"{skill}{m.name} {_show(m.value)} ({SIGNS[m.sense]} {m.threshold:g})"
@@ -58,6 +61,18 @@ def certificate_summary(
     return f'<p class="verdict">{said} Tightest: {html.escape(listed)}.</p>'
 
 
+def _state(run: Path, creature: Creature, champion: Champion) -> ValidCertificate | NoCertificate:
+    """State of the run's certificate.
+
+    Raises:
+      UserError: the file is not a certificate.
+    """
+    state = certificate_state(run / CERTIFICATE, champion, creature)
+    if isinstance(state, NoCertificate) and state.lack is Lack.UNREADABLE:
+        raise UserError(state.reason)
+    return state
+
+
 def _uncertified(reasons: Sequence[str], way_out: str) -> str:
     """Paragraph on a champion without a valid certificate."""
     said = html.escape(f"Not certified: {'; '.join(reasons)}.")
@@ -65,12 +80,18 @@ def _uncertified(reasons: Sequence[str], way_out: str) -> str:
 
 
 def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:
-    """Return the criteria as a table, or the reason why there is none."""
-    document = read_certificate(run / CERTIFICATE)
-    if document is None:
-        return "<p>Not examined: <code>mjxgait certify</code> does it.</p>"
-    if reason := outdated(document, champion, creature):
-        return f"<p>{html.escape(reason)} <code>mjxgait certify</code> examines this one.</p>"
+    """Return the criteria as a table, or the reason why there is none.
+
+    Raises:
+      UserError: the file is not a certificate.
+    """
+    state = _state(run, creature, champion)
+    if isinstance(state, NoCertificate):
+        if state.lack is Lack.MISSING:
+            return "<p>Not examined: <code>mjxgait certify</code> does it.</p>"
+        reason = html.escape(f"{state.reason[0].upper()}{state.reason[1:]}.")
+        return f"<p>{reason} <code>mjxgait certify</code> examines this one.</p>"
+    document, verdict = state.document, state.verdict
     rows = [
         [
             f"{c.number} {c.name}",
@@ -83,7 +104,6 @@ def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:
         for m in c.measures
     ]
     measured = table(("criterion", "measure", "value", "wanted", "verdict"), rows)
-    verdict = verdict_of(document)
     said, advised = html.escape(_said(verdict)), _advice(document, verdict)
     folded = f"<details><summary>All measures</summary>{measured}</details>"
     return f"<p>{said}</p>{advised}{folded}{_anywhere(run, champion)}<p>{CHECK}</p>"

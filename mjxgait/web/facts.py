@@ -95,13 +95,14 @@ def _check(creature: Creature, champion: Champion) -> None:
     name = creature.name
     if champion.controller not in CONTROLLERS:
         raise UserError(
-            f"{name}: a page with physics runs key poses, expressions, networks and brains, not the controller "
-            f'"{champion.controller}"; leave --physics out, and the page plays the recorded walk'
+            f"{name}: a page with physics runs key poses, expressions, networks and brains, not "
+            f'the controller "{champion.controller}"; leave --physics out, and the page plays the '
+            "recorded walk"
         )
     if how_simulated(champion.task).next_goal(np.ones(1), np.ones(1), np.ones(1))[0] > 1:
         raise UserError(
-            f'{name}: a page with physics has one goal, and those of "{champion.task}" move on; leave '
-            "--physics out"
+            f'{name}: a page with physics has one goal, and those of "{champion.task}" move on; '
+            "leave --physics out"
         )
     if not creature.terrain.flat:
         raise UserError(

@@ -1,5 +1,4 @@
-"""The best individuals of a run that may still learn, simulated one by one, side by side in a scene.
-
+"""The best individuals of a run that may still learn, each simulated, side by side in a scene.
 The champion is the best of the latest generation, the others those of the latest checkpoint, so a
 training writes nothing more for them.
 """

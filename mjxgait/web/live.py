@@ -1,5 +1,4 @@
-"""Local page that shows a run as it learns: its best individuals side by side and the fitness curve.
-
+"""Local page that shows a run as it learns: its best individuals side by side, and the fitness.
 A separate process only reads the run folder, so it cannot disturb a training and works on a
 finished run as well. The browser plays the animation; the only cost here is one short simulation
 of each new individual that is shown.

@@ -77,18 +77,18 @@ def _lead(walk: Walk, loop: WalkLoop) -> str:
     """The motion in numbers."""
     if not loop.strides:
         return (
-            f"A contest of {loop.times[-1]:.0f} s for the cube, which the page repeats. The champion "
-            "is bright, its opponent dark."
+            f"A contest of {loop.times[-1]:.0f} s for the cube, which the page repeats. The "
+            "champion is bright, its opponent dark."
         )
     seconds = loop.times[-1] / loop.strides
     if walk.grown:
         return (
-            f"{loop.speed:.2f} m/s. The page repeats the {seconds:.1f} s after which the creature is "
-            "most like it was."
+            f"{loop.speed:.2f} m/s. The page repeats the {seconds:.1f} s after which the creature "
+            "is most like it was."
         )
     return (
-        f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.frame.body_length:.2f} body lengths per "
-        f"second; a stride takes {seconds:.2f} s and leads {loop.advance / loop.strides:.2f} m "
+        f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.frame.body_length:.2f} body lengths "
+        f"per second; a stride takes {seconds:.2f} s and leads {loop.advance / loop.strides:.2f} m "
         "forward."
     )
 

@@ -3,6 +3,7 @@
 import base64
 import gzip
 import html
+import re
 from pathlib import Path
 
 import mujoco
@@ -22,17 +23,23 @@ from mjxgait.web.wasm import PACKAGE, VERSION, Engine, engine_from
 
 SECONDS = 5.0
 """s of the champion's walk that are simulated for the notice on its certificate."""
-CLASSES = {
-    "key_poses.js": "KeyPoses",
-    "expressions.js": "Expressions",
-    "network.js": "Network",
-    "brain.js": "Brain",
-    "water.js": "Water",
-    "ground.js": "Ground",
-    "simulation.js": "Simulation",
-    "view.js": "View",
-}
-"""Modules that the page's own script, `physics.js`, uses, and the class of each."""
+MODULES = (
+    "vectors.js",
+    "key_poses.js",
+    "expressions.js",
+    "network.js",
+    "brain.js",
+    "water.js",
+    "ground.js",
+    "senses.js",
+    "motors.js",
+    "hand.js",
+    "simulation.js",
+    "view.js",
+)
+"""Modules of the page's own script, `physics.js`; each comes after those that it imports."""
+IMPORT = re.compile(r'^import (\{[^}]*\}) from "\./\w+\.js";$', re.MULTILINE)
+EXPORTED = re.compile(r"^export (?:class|const|function) (\w+)", re.MULTILINE)
 WIDE, FARTHEST = np.radians(30.0), 3.0
 """Camera's field of view in rad, and its largest distance in units of the first, from which it
 shows all of the creature.
@@ -61,12 +68,14 @@ def write_physics_page(run: Path, out: Path, wasm: Path | None = None) -> str:
 
 
 LEAD = (
-    "This is physics, not animation: MuJoCo runs in this page, and the evolved controller moves the "
+    "This is physics, not animation: MuJoCo runs in this page, and the evolved controller moves "
+    "the "
     "joints."
 )
 CONTENTS = (
     f"MuJoCo {VERSION} (npm package {PACKAGE}, Google DeepMind) and model-viewer (Google), both "
-    "under the Apache License 2.0; the creature and its controller, by mjxgait. The page asks for no "
+    "under the Apache License 2.0; the creature and its controller, by mjxgait. The page asks for "
+    "no "
     "other file and no network."
 )
 
@@ -117,7 +126,7 @@ def build_physics_page(
         binary=base64.b64encode(gzip.compress(engine.binary, 6, mtime=0)).decode("ascii"),
         viewer=embedded(viewer_script()),
         engine=embedded(script),
-        modules="\n".join(_module(name, kind) for name, kind in CLASSES.items()),
+        modules="\n".join(map(_module, MODULES)),
         code=asset("physics.js"),
     )
 
@@ -131,6 +140,9 @@ def _extent(model: mujoco.MjModel, qpos: np.ndarray) -> tuple[float, float]:
     return float((low + high)[2] / 2), float(np.linalg.norm(high - low) / 2)
 
 
-def _module(name: str, kind: str) -> str:
-    """Script element with a module, whose class other scripts find under its name."""
-    return f'<script type="module">\n{asset(name)}\nglobalThis.{kind} = {kind};\n</script>'
+def _module(name: str) -> str:
+    """Script element with a module. In one file none can import another: the exports are global."""
+    code = asset(name)
+    exported = f"Object.assign(globalThis, {{ {', '.join(EXPORTED.findall(code))} }});"
+    imported = IMPORT.sub(r"const \1 = globalThis;", code)
+    return f'<script type="module">\n{imported}\n{exported}\n</script>'

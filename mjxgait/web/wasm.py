@@ -29,7 +29,10 @@ MOST = 100_000_000
 """Largest size of a file in bytes."""
 PATIENCE = 300.0
 """s; npm waits for the network."""
-BY_HAND = f"fetch the npm package {PACKAGE} {VERSION} elsewhere, unpack it, and name its folder with --wasm"
+BY_HAND = (
+    f"fetch the npm package {PACKAGE} {VERSION} elsewhere, unpack it, and name its folder with "
+    "--wasm"
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +117,8 @@ def _pack(npm: str, work: str) -> None:
         lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
         reason = lines[0] if lines else f"exit code {done.returncode}"
     raise UserError(
-        f"npm could not fetch {PACKAGE} {VERSION} ({reason}); try again with a network, or {BY_HAND}"
+        f"npm could not fetch {PACKAGE} {VERSION} ({reason}); try again with a network, or "
+        f"{BY_HAND}"
     )
 
 

@@ -1,4 +1,4 @@
-"""A repertoire of one stored walk: at its speed, at half of it, and as if it turned to either side."""
+"""A repertoire of one stored walk: at its speed, at half, and as if it turned to either side."""
 
 import dataclasses
 import json

@@ -128,7 +128,8 @@ def test_a_character_goes_where_it_is_driven(tmp_path: Path):
     assert curve["pace"] == pytest.approx(1 / slow["duration"], rel=1e-3)
     assert curve["turn"] == pytest.approx(5.0, rel=0.1)
     assert sharp["turn"] == pytest.approx(-TURN, rel=0.1), "no more than its walks"
-    # The lowest bone slides by 0.30 of the way in the walk itself, by more where it blends with a stand.
+    # The lowest bone slides by 0.30 of the way in the walk itself, by more where it blends with a
+    # stand.
     assert max(ahead["slid"], sharp["slid"]) < 0.35
     assert curve["slid"] < 0.5
     assert min(part["bone_turned"] for part in (ahead, curve, sharp)) > 0.05

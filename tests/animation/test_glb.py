@@ -256,7 +256,7 @@ def test_a_champion_without_a_steady_stride_is_refused(stool):
 
 
 def test_the_command_writes_the_file(stool_run, tmp_path, capsys):
-    for name, code in (("walk.glb", 0), ("walk.fbx", 2), ("missing/walk.glb", 2)):
+    for name, code in (("walk.glb", 0), ("walk.gltf", 2), ("missing/walk.glb", 2)):
         with pytest.raises(SystemExit) as ended:
             main(
                 [

@@ -37,7 +37,7 @@ BY_MATRIX = {"in centimetres": (), "turned": ("Armature", "Hips", "LeftShin"), "
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Case:
-    """A character, its creature's walk, and the way from the character's own axes, m, to the scene."""
+    """A character, its creature's walk, and the way in m from the character's axes to the scene."""
 
     file: Path
     loop: WalkLoop

@@ -49,7 +49,7 @@ DRAWN = {
     "bear with thick forepaws": Drawn(BEAR, PAWS, {"LeftHand": 0.02, "RightHand": 0.02}),
     "person": Drawn(FIGURE, (("LFoot",), ("RFoot",))),
 }
-"""At rest the paws of the dog are 2 % of its hip height below the origin, the bear's forepaws 7 %."""
+"""At rest the dog's paws are 2 % of its hip height below the origin, the bear's forepaws 7 %."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ def gone(data, after, point: np.ndarray, body: int) -> np.ndarray:
 
 
 def test_the_skin_stands_on_the_floor_where_the_simulated_feet_do(shown: Shown):
-    """Within 1 % of the hip height of the floor, which is at the origin of the scene if it can be."""
+    """Within 1 % of the hip height of the floor, which is at the scene's origin if it can be."""
     heights, _ = simulated(shown.loop)
     lows, down = shown.lows() / shown.hip, heights / shown.hip
     assert (down < 0.005).any(0).all(), "each foot stands somewhere in the loop"

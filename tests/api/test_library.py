@@ -164,7 +164,7 @@ def test_nothing_is_overwritten(run: mjxgait.Run):
         (lambda: mjxgait.train(STOOL, population=1), "population must be at least 2"),
         (lambda: mjxgait.train(STOOL, controller="my.py:Spin"), "no such file"),
         (lambda: mjxgait.refine(STOOL, "no.glb"), "no such file"),
-        (lambda: mjxgait.refine(STOOL, "no.fbx"), "Blender"),
+        (lambda: mjxgait.refine(STOOL, "no.blend"), "glTF binary"),
         (lambda: mjxgait.open("nowhere"), "no such folder"),
         (lambda: mjxgait.walk("nowhere"), "no such folder"),
         (lambda: mjxgait.open(5), "5: name a file or a folder"),

@@ -1,4 +1,4 @@
-"""PPO: its policy is the network controller, episode by episode, and its parts do as they should."""
+"""PPO: its policy is the network controller, episode by episode; its parts do as they should."""
 
 import jax
 import jax.numpy as jnp
@@ -63,7 +63,7 @@ def test_an_episode_in_the_environment_is_the_controllers_in_the_simulator(stool
 
 
 class Hill:
-    """A world of one step per episode: the reward is highest where the action is the input's half."""
+    """A world of one step per episode, with the highest reward where action is half the input."""
 
     inputs, joints = 1, 1
 

@@ -366,7 +366,10 @@ def test_numbers_that_are_not_finite_are_refused_in_one_sentence(
 
 
 def test_the_certification_never_imports_jax():
-    code = "import mjxgait.certification, sys; sys.exit(any(name.split('.')[0] in ('jax', 'jaxlib', 'mjx') for name in sys.modules))"
+    code = (
+        "import mjxgait.certification, sys; "
+        "sys.exit(any(n.split('.')[0] in ('jax', 'jaxlib', 'mjx') for n in sys.modules))"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -21,6 +21,7 @@ from mjxgait.training.folder import CERTIFICATE, METRICS, open_run
 from mjxgait.training.logs import read_metrics
 
 ELSEWHERE = {
+    "build": "tests/hardware/test_robot.py::test_a_build_folder_holds_closed_parts_a_bill_and_a_model",
     "completion": "tests/end_to_end/test_commands.py::test_completion_knows_commands_and_options",
     "train": "tests/end_to_end/test_trainings.py::test_a_training_ends_with_a_certificate",
     "ablate": "tests/end_to_end/test_studies.py::test_a_study_ends_with_its_report",

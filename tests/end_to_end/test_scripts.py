@@ -37,8 +37,10 @@ ELSEWHERE = {
     "cluster.py": RAY,
     "cluster_faults.py": RAY,
     "speed.py": "tests/benchmarks/test_bench.py",
-    "fuzz_readers.py": "needs atheris; tests/animation/keys/test_hostile_keys.py and tests/importer/test_fuzz.py change files too",
-    "build_addons.py": "tests/addons/test_blender.py runs it in the checkout, whose add-ons it packs",
+    "fuzz_readers.py": "needs atheris; tests/animation/keys/test_hostile_keys.py and "
+    "tests/importer/test_fuzz.py change files too",
+    "build_addons.py": "tests/addons/test_blender.py runs it in the checkout, "
+    "whose add-ons it packs",
     "plant_faults.py": "tests/test_faults.py runs it on a tree of its own",
 }
 """Scripts not run here, and why."""

@@ -79,13 +79,14 @@ def generation(
         generation=state.generation + 1,
     )
     names = {field.name for field in dataclasses.fields(GenerationMetrics)}
-    numbers = dict.fromkeys(names - {"mothers", "level"}, np.ones(()))
+    numbers = dict.fromkeys(names - {"mothers", "fathers", "level"}, np.ones(()))
     known = {
         "generation": later.generation,
         "forced": np.zeros((), bool),
         "best_terms": np.zeros(state.terms.shape[-1]),
         "best_outcome": np.zeros(state.outcome.shape[-1]),
         "mothers": np.zeros(state.fitness.shape, np.int32) if follows else None,
+        "fathers": np.full(state.fitness.shape, -1, np.int32) if follows else None,
     }
     metrics = GenerationMetrics(**(numbers | known), level=state.level)
     return one_row((later, metrics))

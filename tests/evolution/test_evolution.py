@@ -19,6 +19,7 @@ from mjxgait.evolution.breeding import parents, proportional_parents
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.evolution import Evolution
 from mjxgait.evolution.state import (
+    NO_FATHER,
     NO_MOTHER,
     EvolutionState,
     GenerationMetrics,
@@ -509,6 +510,31 @@ def test_the_log_names_each_individuals_mother():
         children += born.sum()
     assert children > 20
     assert history[0][1].mothers.shape == (20,)
+
+
+def test_the_log_names_the_father_of_each_child_of_two():
+    """Without mutation each gene of such a child is one of its two parents'."""
+    history = run(toy(crossover=1.0, mutation_rate=0.0, forced=NEVER), 8)
+    children = of_father = 0
+    assert (history[0][1].fathers == NO_FATHER).all()
+    for (before, _), (after, metrics) in itertools.pairwise(history):
+        born = after.born == after.generation
+        assert (metrics.fathers[~born] == NO_FATHER).all()
+        assert (metrics.fathers[born] != metrics.mothers[born]).all()
+        mine = after.genomes.key_poses[born]
+        hers, his = (
+            mine == before.genomes.key_poses[places[born]]
+            for places in (metrics.mothers, metrics.fathers)
+        )
+        assert (hers | his).all()
+        children, of_father = children + born.sum(), of_father + (his & ~hers).any((1, 2)).sum()
+    assert children > 20
+    assert of_father > children / 2
+
+
+def test_a_child_of_one_parent_has_no_father():
+    for _, metrics in run(toy(crossover=0.0, forced=NEVER), 4):
+        assert (metrics.fathers == NO_FATHER).all()
 
 
 def test_a_growing_pool_evolves_and_simulates_no_genome_twice():

@@ -86,8 +86,8 @@ def glb(
     """A mesh of rings about each bone that follow it alone, below an armature in centimetres.
 
     thick: m, radius of the rings. handles: a root on the floor, and a bone that moves no skin.
-    soles: also a point above and one below the end of each limb. paws: m by bone, by which that below
-    is further down.
+    soles: also a point above and one below the end of each limb. paws: m by bone, by which that
+    below is further down.
     """
     document = gltf.GLTF2(asset=gltf.Asset(version="2.0"))
     buffer = Buffer(document)

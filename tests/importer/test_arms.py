@@ -25,9 +25,11 @@ from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.importer import ImportChoices, Imported, import_model
+from mjxgait.importer.notes import Notes
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_arms import hanging
 from mjxgait.importer.rig_radii import radii_of
+from mjxgait.importer.rigged import model_of
 
 ARM: dict[str, Bone] = {
     "Collar": ("Chest", (3, 140, 0), None),
@@ -69,7 +71,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def imported(file: Path) -> Imported:
-    return import_model(file, ImportChoices(apart=False, keep=("*Arm_pitch",)))
+    return import_model(file, ImportChoices(apart=False))
 
 
 @pytest.fixture(scope="module")
@@ -153,12 +155,23 @@ def test_wings_and_arms_that_hang_already_stay(tmp_path: Path):
         assert (rig.places == plan.rig.places).all()
 
 
+LONG = FIGURE | {
+    side + "Hand": (side + "Forearm", (sign * 120, 140, 0), (sign * 150, 140, 0))
+    for side, sign in (("L", 1), ("R", -1))
+}
+"""Hands that would reach the floor."""
+
+
 def test_a_hand_that_would_reach_the_floor_stays(tmp_path: Path):
-    long = FIGURE | {
-        side + "Hand": (side + "Forearm", (sign * 120, 140, 0), (sign * 150, 140, 0))
-        for side, sign in (("L", 1), ("R", -1))
-    }
-    assert not hung_of(planned(tmp_path, long))[1]
+    assert not hung_of(planned(tmp_path, LONG))[1]
+
+
+@pytest.mark.parametrize(("bones", "arms"), [(FIGURE, "LR"), (LONG, ""), (BIRD, "")])
+def test_only_arms_that_hang_swing(tmp_path: Path, bones: dict[str, Bone], arms: str):
+    file = tmp_path / "rig.bvh"
+    file.write_text(bvh(bones))
+    swings = model_of(file, None, None, Notes()).swings
+    assert swings == {f"{side}Arm_pitch" for side in arms}
 
 
 def test_the_files_rest_is_that_of_its_bones(creature: Creature):
@@ -174,10 +187,8 @@ def test_the_files_rest_is_that_of_its_bones(creature: Creature):
         assert hung.body(side + "Hand").xpos[2] < hung.body(side + "Arm").xpos[2] - 0.4
 
 
-def test_arms_that_nothing_keeps_are_still(file: Path):
-    without = import_model(file, ImportChoices(apart=False))
-    still = load_files(without.files)
-    assert "--keep LArm_pitch --keep RArm_pitch lets them swing" in without.notes.text()
+def test_frozen_arms_are_still(file: Path):
+    still = load_files(import_model(file, ImportChoices(apart=False, freeze=("*Arm_pitch",))).files)
     assert not still.joints.swings
     assert not [name for name in still.joints.names if "Arm" in name]
     hung = at_rest(still, still.model)
@@ -252,7 +263,7 @@ def test_the_characters_own_arms_hang_in_its_walk(creature: Creature, file: Path
 def test_a_cycle_of_the_file_is_read_from_its_own_rest(
     creature: Creature, file: Path, tmp_path: Path
 ):
-    """In a clip arms hang by a turn of about 80 degrees from the rest; for the body that is none."""
+    """In a clip arms hang by a turn of about 80 degrees from rest; for the body that is none."""
     quat = np.array(creature.settings.rig.turned["LArm"])
     angle = float(np.degrees(2 * np.arccos(quat[0])))
     assert 60 < angle < 90

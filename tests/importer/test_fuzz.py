@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 LARGE, SMALL = 6, 24
-"""Shares that the inputs are parted into: large ones, and small ones, of which one is always run."""
+"""Shares that the inputs are parted into: large ones, and small ones, one of which always runs."""
 SECONDS = 60
 """For a share; one that hangs is killed then. A single input that takes a sixth of it fails too."""
 

@@ -4,13 +4,16 @@ import functools
 import re
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 import trimesh
 from importer.models import BIPED, bring
 from trimesh.exchange.dae import export_collada
 
+from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.importer import Imported
 from mjxgait.importer.meshes import convert, converted
 from mjxgait.reference.measure import dimensions
 
@@ -63,19 +66,42 @@ def test_a_damaged_mesh_is_reported(key: str, data: bytes):
     assert [told[0] for told in failed] == [key]
 
 
-def test_feet_get_the_soles_of_their_collada_meshes(tmp_path: Path):
-    """The model has no other shapes."""
+NAMES = re.findall(r"package://biped/meshes/(\w+)\.dae", BIPED)
+
+
+def bring_meshes(tmp_path: Path, data: bytes) -> tuple[Creature, Imported]:
+    """A biped with this mesh for each link, and no other shapes."""
     meshes = tmp_path / "meshes"
     meshes.mkdir()
-    names = re.findall(r"package://biped/meshes/(\w+)\.dae", BIPED)
-    for name in names:
-        (meshes / f"{name}.dae").write_bytes(written("dae"))
+    for name in NAMES:
+        (meshes / f"{name}.dae").write_bytes(data)
     text = re.sub(r"<collision>.*?</collision>", "", BIPED).replace("package://biped/", "")
-    creature, imported = bring_urdf(tmp_path, text)
+    return bring_urdf(tmp_path, text)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_up_axis_of_a_collada_file_counts_where_links_fit_for_it(tmp_path: Path, turned: bool):
+    """Viewers disagree about it, so there are files of both kinds."""
+    mesh = BLOCK.copy()
+    if turned:
+        mesh.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0)))
+    data = written("dae", mesh).replace(b"<asset>", b"<asset><up_axis>Y_UP</up_axis>")
+    creature, imported = bring_meshes(tmp_path, data)
+    model = creature.model
+    assert ("turned so that their y is up" in imported.notes.text()) == turned
+    shin = next(g for g in range(model.ngeom) if "shin" in model.body(model.geom_bodyid[g]).name)
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[shin])
+    half = np.abs(rotation.reshape(3, 3)) @ model.geom_aabb[shin][3:]
+    np.testing.assert_allclose(half, BLOCK.extents / 2, rtol=1e-3)
+
+
+def test_feet_get_the_soles_of_their_collada_meshes(tmp_path: Path):
+    creature, imported = bring_meshes(tmp_path, written("dae"))
     for words in ("mesh and its shapes dropped", "capsules for", "sphere added"):
         assert words not in imported.notes.text(), words
     hulls = creature.model.geom_dataid[creature.model.geom_dataid >= 0]
-    assert len(hulls) == len(names)
+    assert len(hulls) == len(NAMES)
     assert imported.stands
     assert all(len(names) > 0 for names in creature.feet.names)
 

@@ -31,7 +31,7 @@ REFUSED = {
     "dm swimmer": "no hinge joint below it",
 }
 FALLS = {"bolt", "berkeley"}
-"""Point feet, and soles that are short for the weight above them: these stand only while they step."""
+"""Point feet, and soles too short for the weight above them: these stand only while stepping."""
 FEET = {
     "gym ant": 4,
     "gym half_cheetah": 2,

@@ -427,8 +427,8 @@ def test_a_bad_file_is_one_sentence_and_nothing_is_written(tmp_path: Path, name:
     assert [*tmp_path.iterdir()] == [file]
 
 
-def test_a_file_of_blender_or_fbx_has_a_way_out(tmp_path: Path):
-    for kind in ("fbx", "blend", "gltf"):
+def test_a_file_of_blender_or_of_gltf_in_parts_has_a_way_out(tmp_path: Path):
+    for kind in ("blend", "gltf"):
         (tmp_path / f"dog.{kind}").write_text("x")
         with pytest.raises(UserError, match=r"glTF binary \(\.glb\)"):
             import_model(tmp_path / f"dog.{kind}")

@@ -1,4 +1,4 @@
-"""Faults that a file states plainly: limits the wrong way round, masses of zero, joints in a ring."""
+"""Faults that a file states plainly: limits the wrong way round, zero masses, joints in a ring."""
 
 from pathlib import Path
 

@@ -39,8 +39,8 @@ class BodyPerStart(Simulator):
 
 
 pytestmark = pytest.mark.thorough(
-    "tests/training/test_evolve_body.py and tests/tasks/modular/test_swimming.py compare episodes of bodies that "
-    "differ with C MuJoCo, and test_bodies.py compares their steps"
+    "tests/training/test_evolve_body.py and tests/tasks/modular/test_swimming.py compare episodes of "
+    "bodies that differ with C MuJoCo, and test_bodies.py compares their steps"
 )
 
 

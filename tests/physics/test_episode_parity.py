@@ -121,8 +121,8 @@ def expected(
 def test_every_statistic_is_compared(expected: dict):
     for name in FIELDS:
         assert all(name in stats for stats in expected.values()), (
-            f"WalkStats.{name} is compared with nothing: work it out in recorded_stats.py, or say in "
-            f"UNCOMPARED why not"
+            f"WalkStats.{name} is compared with nothing: work it out in recorded_stats.py, or say "
+            "in UNCOMPARED why not"
         )
 
 

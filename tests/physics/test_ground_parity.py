@@ -1,7 +1,8 @@
 """Both plants on uneven ground against C MuJoCo (float64), with one plane under each foot.
 
-Gravity is tilted, too. Each plane touches the ground at the point nearest to the foot, from the reference simulator's
-heights. So contacts in C have the same place, axes and weight, and whole steps can be compared.
+Gravity is tilted, too. Each plane touches the ground at the point nearest to the foot, from the
+reference simulator's heights. So contacts in C have the same place, axes and weight, and whole
+steps can be compared.
 """
 
 import dataclasses

@@ -16,7 +16,6 @@ NOTE = "mjxgait"
 """Name of the node property that holds an exported walk's note on its origin."""
 ELSEWHERE = {
     ".gltf": "export as glTF binary (.glb), which is one file",
-    ".fbx": "open it in Blender and export as glTF binary (.glb)",
     ".blend": "export as glTF binary (.glb)",
 }
 """Formats that are not read, and the workaround."""

@@ -1,4 +1,4 @@
-"""The user's character: a GLB file, its tree of nodes at rest, and the bones of its skin.
+"""The user's character: a GLB or FBX file, its tree of nodes at rest, and the bones of its skin.
 
 Letters: `N` nodes of the file.
 """
@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.clips.clip import read_bytes, written
+from mjxgait.animation.clips.fbx import opened
 from mjxgait.animation.clips.glb_document import DAMAGED, Document, Part, damaged, open_glb
 from mjxgait.animation.clips.read_glb import name_of, placed, skin_of, worlds
 from mjxgait.errors import UserError
@@ -18,11 +19,11 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Character:
-    """A GLB file and its nodes.
+    """A GLB file and its nodes; an FBX file as the GLB that Blender makes of it.
 
-    data: its bytes. document: its description. parents: [N] -1 for none. order: [N] parents first.
-    local, world: [N, 4, 4] at rest against the parent, and in the scene. bones: nodes by name,
-    those of the largest skin. clips: names of the animations.
+    path: of the user's file. data: bytes of the GLB. document: its description. parents: [N] -1 for
+    none. order: [N] parents first. local, world: [N, 4, 4] at rest against the parent, and in the
+    scene. bones: nodes by name, those of the largest skin. clips: names of the animations.
     """
 
     path: Path
@@ -61,8 +62,13 @@ def read_character(path: Path) -> Character:
     """Return the bones of a file.
 
     Raises:
-      UserError: it is no GLB, is damaged, or has no skin.
+      UserError: it is no GLB or FBX, is damaged, or has no skin; FBX takes a Blender.
     """
+    with opened(path) as file:
+        return dataclasses.replace(_read(file), path=path)
+
+
+def _read(path: Path) -> Character:
     document = open_glb(path)
     nodes = document.nodes
     try:

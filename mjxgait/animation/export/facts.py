@@ -10,14 +10,18 @@ import numpy as np
 
 from mjxgait.animation.export.footfalls import contacts
 from mjxgait.animation.export.loop import WalkLoop
-from mjxgait.certification import outdated, read_certificate, verdict_of
+from mjxgait.certification import Lack, NoCertificate, certificate_state
 from mjxgait.certification.describe import gait_name
-from mjxgait.errors import UserError
 from mjxgait.rendering.walk import Walk
 from mjxgait.training.folder import CERTIFICATE
 
 CONTACTS = "contacts"
 UNEXAMINED = "not examined"
+IN_WORDS = {
+    Lack.MISSING: UNEXAMINED,
+    Lack.UNREADABLE: "not certified: its certificate cannot be read",
+    Lack.OUTDATED: "not certified: its certificate is outdated",
+}
 
 
 def facts_of(loop: WalkLoop, travelling: bool, units: float = 1.0) -> dict[str, object]:
@@ -70,18 +74,12 @@ def examined(run: Path, walk: Walk) -> str:
     """
     if np.isfinite(walk.fell):
         return f"not certified: falls after {walk.fell:.1f} s"
-    try:
-        document = read_certificate(run / CERTIFICATE)
-    except UserError:
-        return "not certified: its certificate cannot be read"
-    if document is None:
-        return UNEXAMINED
-    if outdated(document, walk.champion, walk.creature):
-        return "not certified: its certificate is outdated"
-    verdict = verdict_of(document)
-    if not verdict.certified:
-        return f"not certified: {verdict.in_words()}"
-    return certified(verdict.margin)
+    state = certificate_state(run / CERTIFICATE, walk.champion, walk.creature)
+    if isinstance(state, NoCertificate):
+        return IN_WORDS[state.lack]
+    if not state.verdict.certified:
+        return f"not certified: {state.verdict.in_words()}"
+    return certified(state.verdict.margin)
 
 
 def certified(margin: float) -> str:

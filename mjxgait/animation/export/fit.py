@@ -82,8 +82,8 @@ def fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> Fi
         worst = [list(bones)[i] for i in np.argsort(-off) if not off[i] < SLACK * hip]
         names = quoted([creature.settings.rig.bones[part] for part in worst])
         raise UserError(
-            f"{character.path}: at rest its bones {names} are up to {off.max() / hip:.0%} of the hip "
-            f"height off the parts of {creature.name}; name the file that was imported "
+            f"{character.path}: at rest its bones {names} are up to {off.max() / hip:.0%} of the "
+            f"hip height off the parts of {creature.name}; name the file that was imported "
             f"({creature.settings.rig.file}), or import this one and train it"
         )
     return plain.raised(factor * lows(loop, resting(loop)[None]).min())

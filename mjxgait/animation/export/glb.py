@@ -14,6 +14,7 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.clips.clip import NOTE
+from mjxgait.animation.clips.fbx import write_animated
 from mjxgait.animation.export.facts import CONTACTS, facts_of, measured_facts
 from mjxgait.animation.export.floor import add_tiles
 from mjxgait.animation.export.gltf import Buffer, add_channel
@@ -32,7 +33,6 @@ from mjxgait.animation.export.skeleton import (
 )
 from mjxgait.animation.export.surface import Piece, along_limbs, pieces_of
 from mjxgait.champion.serializers import serializer_of
-from mjxgait.files import write_bytes, writing
 
 WALK = "walk"
 """Name of an exported walk; see `animation_of`."""
@@ -69,13 +69,12 @@ def _stride(loop: WalkLoop, angles: np.ndarray) -> np.ndarray:
 
 
 def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
-    """Write the loop; see `build_glb`.
+    """Write the loop as GLB or FBX; see `build_glb`.
 
     Raises:
-      UserError: the file cannot be written.
+      UserError: the file cannot be written; FBX takes a Blender.
     """
-    with writing(path):
-        write_bytes(path, build_glb(loop, travelling, footfalls=True))
+    write_animated(path, build_glb(loop, travelling, footfalls=True), loop.rate)
 
 
 def build_glb(

@@ -14,6 +14,7 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation
 
+from mjxgait.animation.clips.fbx import write_animated
 from mjxgait.animation.clips.glb_document import DAMAGED, damaged
 from mjxgait.animation.clips.read_glb import name_of
 from mjxgait.animation.export.character import Character
@@ -34,22 +35,20 @@ from mjxgait.animation.export.skeleton import (
 )
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.files import write_bytes, writing
 
 EVEN = 1e-3
 """Relative difference of two scales, from which a bone below them would be sheared."""
 
 
 def export_onto(loop: WalkLoop, character: Character, path: Path, travelling: bool = False) -> str:
-    """Write the loop; see `build_onto`. Return the animation's name.
+    """Write the loop as GLB or FBX; see `build_onto`. Return the animation's name.
 
     Raises:
       UserError: the file has not the creature's skeleton, or cannot be written.
     """
     name = animation_of("walk", loop)
     names, data = build_onto({name: loop}, character, travelling)
-    with writing(path):
-        write_bytes(path, data)
+    write_animated(path, data, loop.rate, names[name], character.path)
     return names[name]
 
 

@@ -1,8 +1,8 @@
 """Feet of a character on the floor, by the vertices of its skin.
 
-The simulated feet are capsules. The skin of a paw is thicker or thinner than they are, and not by the
-same on each foot. So the body moves up or down by one number, and each leg bends or straightens by
-the rest, until the lowest vertex of each foot is as high as the simulated foot. Letters: `F` key
+The simulated feet are capsules. The skin of a paw is thicker or thinner than they are, and not by
+the same on each foot. So the body moves up or down by one number, and each leg bends or straightens
+by the rest, until the lowest vertex of each foot is as high as the simulated foot. Letters: `F` key
 frames, `N` nodes of the file, `K` bones of a leg.
 """
 

@@ -22,7 +22,8 @@ class Goal:
 def posed(character: Character, goals: Mapping[int, Goal]) -> tuple[np.ndarray, np.ndarray]:
     """Transforms [F, N, 4, 4] of all nodes against their parents, and in the scene.
 
-    A node with a goal turns to it, and a free one goes there; all others rest against their parents.
+    A node with a goal turns to it, and a free one goes there; all others rest against their
+    parents.
     """
     frames = len(next(iter(goals.values())).world)
     local = np.tile(character.local, (frames, 1, 1, 1))

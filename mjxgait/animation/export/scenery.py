@@ -33,7 +33,7 @@ MARK, LAMP = 0.012, 0.07
 """Radius of a mark and of a lamp in body lengths."""
 
 CELL, CELLS, EACH = 0.9, 1, 3
-"""Size in body lengths of a cell of still water, cells to each side of it, and particles in each."""
+"""Size in body lengths of a cell of still water, cells to each side, and particles in each."""
 
 
 def add_scenery(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop) -> None:
@@ -99,7 +99,7 @@ def _add_passing(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop, length: f
 
 
 def life(begin: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return key times [6] in s and a mark's age there, 0 to 1; it begins at a share of the loop."""
+    """Return key times [6] in s and a mark's age there, 0 to 1; it begins within the loop."""
     turns = np.sort((begin + np.array([FADE, 1 - FADE])) % 1.0)
     times = seconds * np.sort([0.0, *turns, begin, 1.0])
     at = int(np.searchsorted(times, seconds * begin))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.animation.clips.clip import ELSEWHERE, AngleTrack, Clip
+from mjxgait.animation.clips.fbx import FBX, read_fbx
 from mjxgait.animation.clips.read_glb import read_glb
 from mjxgait.animation.clips.read_text import read_bvh, read_csv, read_json
 from mjxgait.animation.keys.cycle import Cycle, Fit, Own, find_cycle, fit_poses, own_poses
@@ -16,6 +17,7 @@ from mjxgait.errors import UserError
 
 READERS: Mapping[str, Callable[[Path], Clip | AngleTrack]] = {
     ".glb": read_glb,
+    FBX: read_fbx,
     ".bvh": read_bvh,
     ".csv": read_csv,
     ".json": read_json,

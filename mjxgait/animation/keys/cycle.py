@@ -156,8 +156,9 @@ def fit_poses(creature: Creature, cycle: Cycle, tolerance: float) -> Fit:
         if best.error <= tolerance:
             return best
     raise UserError(
-        f"{MOST_POSES} key poses come no nearer than {np.degrees(best.error):.1f} degrees: the cycle "
-        "is too lively, or --from and --to cut more than one of it; a larger --tolerance accepts it"
+        f"{MOST_POSES} key poses come no nearer than {np.degrees(best.error):.1f} degrees: the "
+        "cycle is too lively, or --from and --to cut more than one of it; a larger --tolerance "
+        "accepts it"
     )
 
 

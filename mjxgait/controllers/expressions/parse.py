@@ -233,7 +233,8 @@ class Reader:
             more = [f for f in FUNCTIONS if f in self.mentioned and f not in allowed]
             given = " ".join(f"'{f}'" for f in dict.fromkeys((*allowed, *more, name)))
             raise self.wrong(
-                f'"{word}" is not among controller.functions; add it: --controller.functions {given}'
+                f'"{word}" is not among controller.functions; add it: --controller.functions '
+                f"{given}"
             )
         return name
 

@@ -125,7 +125,7 @@ class PoseReference:
     def corrections(
         self, senses: Mapping[str, np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return `u` (without `steering`), `p` and `r` of docs/reference/controller.md, [S] each."""
+        """Return [S] each: `u` (without `steering`), `p`, `r` of docs/reference/controller.md."""
         gain = self.tuning
         pitch = gain["pitch"] * senses["pitch"] + gain["pitch_rate"] * senses["pitch_rate"]
         roll = gain["roll"] * senses["roll"] + gain["roll_rate"] * senses["roll_rate"]

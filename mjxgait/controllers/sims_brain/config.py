@@ -34,8 +34,8 @@ class BrainConfig:
       sigma: size of these changes, as a share of the range.
       connect: chance of adding or removing a connection.
       grow: chance of a new node.
-      resize: chance of multiplying all sizes of the body by one factor, log-normally distributed with
-        spread `sigma`; ours, not Sims'.
+      resize: chance of multiplying all sizes of the body by one factor, log-normally distributed
+        with spread `sigma`; ours, not Sims'.
       strength: range of a factor that each mutation draws, log-uniformly; it multiplies the number
         of values that change and, up to 1, the chances `connect` and `grow`.
       crossover: share of two-parent offspring with crossed nodes.

@@ -25,8 +25,8 @@ class Boxes:
 def inside(one: Boxes, others: Boxes) -> jax.Array:
     """Return the overlap depth [P] of one block with each other, over the smaller one's size.
 
-    Negative if one of their six normals separates them (`dynamics.deepest`). A size is the cube root of
-    a volume.
+    Negative if one of their six normals separates them (`dynamics.deepest`). A size is the cube
+    root of a volume.
     """
     apart = others.middle - one.middle
     reach = jnp.abs(others.axes @ one.axes.T)  # [P, other's axis, own axis]

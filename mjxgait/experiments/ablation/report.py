@@ -33,8 +33,8 @@ from mjxgait.training.logs import Line
 NAMES = {
     "walk": "body lengths per second covered before a fall or the end of 22 s, mean over 16 unseen "
     "perturbed starts in C MuJoCo",
-    "up": "share of 16 unseen perturbed starts that stay up for 22 s in C MuJoCo, and arrive if the task "
-    "has a goal",
+    "up": "share of 16 unseen perturbed starts that stay up for 22 s in C MuJoCo, and arrive if "
+    "the task has a goal",
     "certified": "share of champions that pass the stable-walk certificate",
     "fitness": "best fitness at the end",
     "area": "best fitness, mean over the generations (area under the curve)",
@@ -44,8 +44,9 @@ OWN_SCALE = ("fitness", "area", "generations")
 """Measures in units of each variant's own fitness."""
 LEVEL = 0.05
 STYLE = (
-    "body{font:16px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em}table{border-collapse:collapse}\
-td,th{border:1px solid #bbb;padding:.2em .6em;text-align:left}img{max-width:100%}"
+    "body{font:16px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em}"
+    "table{border-collapse:collapse}"
+    "td,th{border:1px solid #bbb;padding:.2em .6em;text-align:left}img{max-width:100%}"
 )
 
 
@@ -207,8 +208,8 @@ def _cautions(plan: Plan, results: Sequence[Result]) -> list[str]:
             "generations are not equal cost."
         )
     found.append(
-        f"It holds for {_plain(plan.study.env)} under these settings and this budget; another creature or "
-        "a longer run may differ."
+        f"It holds for {_plain(plan.study.env)} under these settings and this budget; another "
+        "creature or a longer run may differ."
     )
     return found
 
@@ -243,7 +244,10 @@ def _page(title: str, text: str, folder: Path) -> str:
     for name in ("intervals.png", "curves.png"):
         picture = base64.b64encode((folder / name).read_bytes()).decode()
         body = body.replace(f'src="{name}"', f'src="data:image/png;base64,{picture}"')
-    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title><style>{STYLE}</style>'
+    head = (
+        '<!doctype html><html lang="en"><meta charset="utf-8">'
+        f"<title>{html.escape(title)}</title><style>{STYLE}</style>"
+    )
     return f"{head}\n{body}</html>\n"
 
 

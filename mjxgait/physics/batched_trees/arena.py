@@ -238,7 +238,7 @@ def _boxes(state: BodyState, sensed: Sensed, moment: Moment) -> Boxes:
 
 
 def _pushed(step: float, *boxes: Boxes) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Return moments about the middles and forces, [n, 6, L] on the blocks of each of three bodies."""
+    """Return moments about the middles and forces [n, 6, L] on the blocks of three bodies."""
     own, other, cube = boxes
     pin = pinned_by(own.mass[0])
     by_other, on_other = pushes(own, other, step, pin)

@@ -31,7 +31,7 @@ class CompeteStats(RoamStats):
 
 
 class Compete(Roam):
-    """Implementation of `Task`. The share of the cube is the mean nearness: half of it is a draw."""
+    """Implementation of `Task`. The share of the cube is the mean nearness; half is a draw."""
 
     Settings: ClassVar[type] = CompeteConfig
     terms = tuple(field.name for field in dataclasses.fields(CompeteWeights))

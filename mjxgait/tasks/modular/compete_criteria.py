@@ -1,4 +1,4 @@
-"""Acceptance criteria for competing: nearer to the cube than the opponent, from other starts too."""
+"""Acceptance criteria for competing: nearer to the cube than the opponent, from any start."""
 
 import numpy as np
 from typing_extensions import override
@@ -16,7 +16,7 @@ DRAW = 0.5
 
 
 class CompeteCriteria(ModularCriteria):
-    """Implementation of `AcceptanceCriteria`. The opponent is the one of the champion's last trial."""
+    """Implementation of `AcceptanceCriteria`. The opponent is that of the champion's last trial."""
 
     verdict = "it beats its opponent"
     verb = "wins"

@@ -33,7 +33,8 @@ class SwimWeights:
       speed: m/s, in a straight line.
       overlap: part of the speed lost by blocks in each other.
       elsewhere: part of the rest lost by momentum that the water did not give.
-      curve: part of the rest lost by a way that turns: 1 less the cosine between its halves.
+      curve: part of the rest lost by a way that turns: 1 less the cosine between its halves. A
+        follower of a light loses nothing.
     """
 
     __pydantic_config__ = STRICT

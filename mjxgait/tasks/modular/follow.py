@@ -83,7 +83,7 @@ class Following(LocomotionTask):
     def update(
         self, stats: Any, sensed: Sensed, torque: jax.Array, params: jax.Array, goal: Light
     ) -> Any:
-        """A move of the light ends the way towards its old place; the next begins there and then."""
+        """A move of the light ends the way to its old place; the next begins there and then."""
         moved = jnp.any(stats.light != goal.place) & (stats.steps > params)
         gained = jnp.where(moved, self.way(stats), stats.gained)
         settled = jnp.where(moved, stats.place, stats.settled)
@@ -98,6 +98,11 @@ class Following(LocomotionTask):
             length((stats.light - place)[: self.axes]) for place in (stats.settled, stats.place)
         )
         return stats.gained + (before - now)
+
+    @override
+    def curved(self, stats: Any) -> jax.Array:
+        """None: a follower has to turn."""
+        return jnp.zeros(())
 
     def outcome(self, stats: Any) -> Mapping[str, jax.Array]:
         """Also the time in s from which the way counted."""

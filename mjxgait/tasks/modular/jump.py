@@ -77,8 +77,8 @@ class Jump(ModularTask):
     def evaluate(self, stats: JumpStats, settings: JumpConfig) -> Mapping[str, jax.Array]:
         """Height in m; its loss by overlap; the loss of the rest by an early end.
 
-        Blocks overlap each other or the ground. An early end costs: the wildest leap is the last, and
-        a body that lies still does not jump again.
+        Blocks overlap each other or the ground. An early end costs: the wildest leap is the last,
+        and a body that lies still does not jump again.
         """
         height = jnp.mean(stats.heights)
         inside = lost((stats.overlap / settings.overlap) ** SHARPNESS)

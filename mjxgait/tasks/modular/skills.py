@@ -35,7 +35,7 @@ LATE = 1_000_000
 
 @pytree
 class Commanded:
-    """Goal of a trial. skill: [] number of the commanded one. light: None if no skill follows one."""
+    """Goal of a trial. skill: [] number of the commanded one. light: None if none follows one."""
 
     skill: jax.Array
     light: Light | None

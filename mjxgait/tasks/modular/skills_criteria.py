@@ -15,8 +15,7 @@ from mjxgait.tasks.modular.criteria import SwimCriteria
 
 
 class SkillsCriteria(SwimCriteria):
-    """Implementation of `AcceptanceCriteria`. task: the one with skills, of which swimming is first.
-
+    """Implementation of `AcceptanceCriteria`. task: one with skills, of which swimming is first.
     each: the criteria of the skills, in their order.
     """
 

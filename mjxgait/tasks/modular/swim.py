@@ -71,7 +71,7 @@ class Swim(LocomotionTask):
         )
 
     def evaluate(self, stats: SwimStats, settings: SwimConfig) -> Mapping[str, jax.Array]:
-        """The speed; its loss by overlap; of the rest by foreign momentum, of that rest by curves."""
+        """The speed; its loss by overlap, of the rest by foreign momentum, of that by curves."""
         speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
         inside = lost(stats.overlap / settings.overlap)

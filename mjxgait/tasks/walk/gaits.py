@@ -27,9 +27,10 @@ class Gait:
     twice: whether the left does in the second half of a cycle what the right does in the first, as
       with mirrored key poses; if not, the whole cycle must be evolved.
     together: whether left and right do the same at the same time, so that each pose is symmetric.
-    stride: of the textbook cycle, as a share of an animal's. Legs that all push at once bounce twice
-    in the time of a walk's stride.
-    drawn: whether evolution starts from a textbook cycle; a drawn gallop fell more than random poses.
+    stride: of the textbook cycle, as a share of an animal's. Legs that all push at once bounce
+    twice in the time of a walk's stride.
+    drawn: whether evolution starts from a textbook cycle; a drawn gallop fell more than random
+    poses.
     sway: deg of roll, root mean square, that belongs to the gait.
     """
 

@@ -4,7 +4,8 @@
 // neither pages nor MuJoCo. Letters: K key poses, C poses of the cycle, J joints, F feet. Angles are
 // in rad.
 
-const clip = (value, low, high) => Math.min(high, Math.max(low, value));
+import { clip } from "./vectors.js";
+
 const half = value => clip(value, -0.5, 0.5);
 
 // A cycle of the clock has 2^32 parts.

@@ -107,12 +107,13 @@ function ahead({ data, facts: { kind, trunk, start } }) {
 
 // The string's end follows the pointer, at the distance at which the creature was caught.
 function aim(simulation, view, { pulled }) {
-  if (pulled && simulation.pull) simulation.pull.target = view.at(pulled.x, pulled.y, pulled.far);
+  const { pull } = simulation.hand;
+  if (pulled && pull) pull.target = view.at(pulled.x, pulled.y, pulled.far);
 }
 
 function drawLines(simulation, view, state) {
-  const { pull } = simulation;
-  view.line("string", pull && [simulation.pulledPoint(), pull.target]);
+  const { hand } = simulation;
+  view.line("string", hand.pull && [hand.point(), hand.pull.target]);
   const { shove } = state,
     { trunk } = simulation.facts,
     { xpos } = simulation.data;
@@ -147,7 +148,7 @@ function tell(simulation, state, shown, page) {
     ahead: last.place,
     lies,
     paused: state.paused,
-    pulled: Boolean(simulation.pull),
+    pulled: Boolean(simulation.hand.pull),
     apart: simulation.lightDistance(),
     frames: real > 0 ? (shown.length - 1) / real : 0,
     stepped: sum("computing") / Math.max(1, sum("steps")),
@@ -246,7 +247,7 @@ function connectPointer({ simulation, view, state }) {
   const end = event => {
     if (state.pulled?.id !== event.pointerId) return;
     state.pulled = null;
-    simulation.letGo();
+    simulation.hand.letGo();
   };
   viewer.addEventListener(
     "pointerdown",
@@ -263,7 +264,7 @@ function connectPointer({ simulation, view, state }) {
       event.stopPropagation();
       viewer.setPointerCapture(event.pointerId);
       state.pulled = { id: event.pointerId, x: event.clientX, y: event.clientY, far: found.far };
-      simulation.hold(found.body, found.point);
+      simulation.hand.hold(found.body, found.point);
     },
     { capture: true },
   );

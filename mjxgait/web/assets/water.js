@@ -3,10 +3,10 @@
 // For the page of `mjxgait share --physics`. Each face has nine points; the force at one is along
 // its normal, against its velocity along that.
 
+import { dot, three } from "./vectors.js";
+
 const PLACES = [-Math.sqrt(0.6), 0, Math.sqrt(0.6)];
 const SHARES = [5 / 18, 8 / 18, 5 / 18];
-const three = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 export class Water {
   // facts: `water` of mjxgait/web/facts.py: drag in N·s/m³; blocks: geom, body, and half sizes.

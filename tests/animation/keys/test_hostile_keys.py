@@ -180,7 +180,7 @@ def test_a_bad_text_is_one_sentence(stool: Creature, tmp_path: Path, name: str):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("walk.fbx", "Blender"),
+        ("walk.blend", "glTF binary"),
         ("walk.gltf", ".glb"),
         ("walk.obj", "this reads"),
         ("no.glb", "no such"),

@@ -90,7 +90,7 @@ def test_zero_is_the_standing_pose_and_the_largest_outputs_end_in_the_pose_range
 
 
 def test_an_environment_observes_what_the_controller_reads(network, stool):
-    """So a policy that is trained there is this controller: from the same state, the same inputs."""
+    """So a policy trained there is this controller: from the same state, the same inputs."""
     problem = make_problem(stool, small_config(), READS)
     progress, blank = problem._blank()
     draw = np.random.default_rng(2)

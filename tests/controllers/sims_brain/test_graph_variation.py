@@ -8,7 +8,7 @@ from typing import Any, Literal
 import jax
 import numpy as np
 import pytest
-from controllers.sims_brain.made_up import one
+from controllers.sims_brain.made_up import genome_of, one
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.controllers.sims_brain.config import BrainConfig
@@ -23,6 +23,8 @@ from mjxgait.controllers.sims_brain.operators import (
 )
 from mjxgait.controllers.sims_brain.reference_body import JOINTS, NEURONS
 from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.state import Origin
+from mjxgait.inspect.family import CROSSED, GRAFTED, Relative, connected, mixed
 
 CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(steer=True, skills=3), Ranges(), 2000
 KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))
@@ -283,3 +285,30 @@ def _differing(young: object, old: object) -> float:
 def test_steering_cannot_evolve_without_its_weights():
     with pytest.raises(ValueError, match="needs steer"):
         BrainConfig(evolves="steering")
+
+
+def relative(genotypes: Genotype, place: int) -> Relative:
+    return Relative(0, place, Origin.CROSSOVER, 0.0, genome_of(one(genotypes.graph, place)))
+
+
+@pytest.mark.parametrize(("name", "other"), [("cross", GRAFTED), ("graft", CROSSED)])
+def test_a_family_tree_tells_how_a_father_came_in(
+    parents: tuple[Genotype, Genotype], name: str, other: str
+):
+    """Read off the genomes, mutated afterwards as in a run: only then may a father be missed."""
+    mother, father = parents
+    pure = children(name, parents)
+    changed = mutants(pure, 5, Rates(value=2.0, connection=0.0, node=0.0, resize=0.0))
+    word = CROSSED if name == "cross" else GRAFTED
+    seen = 0
+    for place in range(60):
+        hers, his, mine = (relative(one, place) for one in (mother, father, pure))
+        nodes = connected(mine.body)
+        same = [np.array_equal(mine.body[key][nodes], hers.body[key][nodes]) for key in mine.body]
+        found = mixed(mine, hers, his)
+        assert found != other
+        assert (found == word) or all(same) or len(nodes) == len(connected(hers.body))
+        assert mixed(relative(changed, place), hers, his) == found
+        assert mixed(hers, hers, his) == "mutation"
+        seen += found == word
+    assert seen > 20

@@ -20,7 +20,7 @@ JUDGE = measures._evaluate
 def evaluate(
     creature: Path, grounds: Sequence[str], examine: bool, champion: Path, finite: bool
 ) -> Measured:
-    """Stand-in for `measures._evaluate`: killed once, after another champion's result is on disk."""
+    """Stand-in for `measures._evaluate`: killed once, when another champion's result is stored."""
     measures.SECONDS, study = 1.0, creature.parent
     killed = study.with_name(f"{study.name}-was-killed")
     if champion.name == LAST and not killed.exists():

@@ -1,4 +1,4 @@
-"""The table beside a character's file speaks of that file: its metres, its bones, its animations."""
+"""The table beside a character's file speaks of that file: its metres, bones and animations."""
 
 import dataclasses
 import json

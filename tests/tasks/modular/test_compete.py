@@ -169,7 +169,7 @@ def test_a_body_draws_with_its_like(
 def contests(
     experiment: Experiment, first: Any, played: Callable[[Any], Any]
 ) -> list[tuple[Any, Champion]]:
-    """Contests in evolution's physics: statistics and champions, all against the one that goes far."""
+    """Contests in evolution's physics: statistics and champions, all against one that goes far."""
     alone = played(first)
     way = np.linalg.norm((alone.place - alone.settled)[:, 0, :2], axis=1)
     whole = alone.steps[:, 0] == round(SECONDS / 0.01)
@@ -316,7 +316,7 @@ def test_settings_under_which_opponents_differ_are_refused(changed: dict[str, An
 
 
 def test_a_contest_is_shown_whole(contests: list[tuple[Any, Champion]]):
-    """Pictures and files hold both bodies and the cube, not a stride of one; the opponent is dark."""
+    """Pictures and files hold both bodies and the cube, not one's stride; the opponent is dark."""
     champion = contests[0][1]
     walk = record_walk(champion.embodied(load_creature("blocks")), champion, 2.0)
     loop = walk_loop(walk)

@@ -360,7 +360,10 @@ def test_following_counts_the_approach_to_the_light(task: Roam, follower: type):
 
 
 def test_the_way_to_a_light_that_moves_is_the_sum_of_both(task: Roam):
-    """One step of 2 m towards the first light, then three of 1 m away from it, to the second."""
+    """One step of 2 m towards the first light, then three of 1 m away from it, to the second.
+
+    That it turns costs nothing.
+    """
     following = FollowInWater(task.creature, task.step, task.horizon, task.ends)
     settings = following.Settings(settle=task.step)
     stats, params = following.init(), following.params(settings)
@@ -371,6 +374,8 @@ def test_the_way_to_a_light_that_moves_is_the_sum_of_both(task: Roam):
         light = following.next_goal(light, sensed)
         seen.append(float(following.way(stats)))
     assert seen == pytest.approx([0.0, 0.0, 2.0, 3.0, 4.0, 5.0], abs=1e-5)
+    assert float(Swim.curved(following, stats)) > 0.5
+    assert float(following.evaluate(stats, settings)["curve"]) == 0
 
 
 def lights_of(following: Following, rollout: RolloutConfig) -> Light:

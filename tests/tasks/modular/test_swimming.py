@@ -9,12 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from controllers.sims_brain.made_up import CALM, moment
+from PIL import Image
 
 from mjxgait.api import load_creature
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import read_champion, write_champion
+from mjxgait.cli.plot import plot_command
 from mjxgait.controllers.sims_brain.reference_body import DRAG, grow
 from mjxgait.evolution.state import EvolutionState
+from mjxgait.inspect.family import Family
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.plugins.registry import build_config
 from mjxgait.reference.grown import seen_grown
@@ -28,7 +31,9 @@ from mjxgait.tasks.modular.swim import Swim
 from mjxgait.training.advance import metrics_line
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.experiment import Experiment, Step, build_experiment
-from mjxgait.training.folder import METRICS, create_run
+from mjxgait.training.family import keep_newborns
+from mjxgait.training.folder import CHAMPION, METRICS, create_run
+from mjxgait.training.logs import Line, write_lines
 
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},
@@ -197,6 +202,41 @@ def test_a_champion_is_drawn_with_its_ancestors(experiment: Experiment, step: St
         assert len(drawing.axes) == 4
     (run / METRICS).write_text(json.dumps(lines[3] | {"mothers": [-1] * 60}) + "\n")
     assert not bodies_of(run, experiment.champion(state, {})).descend
+
+
+def test_the_family_of_a_champion_is_recorded_and_drawn(
+    experiment: Experiment, step: Step, tmp_path: Path
+):
+    run = tmp_path / "run"
+    create_run(run, experiment.creature, experiment.config)
+    state, checkpoints = experiment.place(experiment.init()), Checkpoints(run)
+    lines: list[Line] = []
+    graphs = []
+    for _ in range(4):
+        state, metrics = step(state)
+        lines.append(metrics_line(jax.device_get(metrics), 1.0, experiment.simulator.task))
+        seen = jax.device_get(_without_key(state))
+        keep_newborns(run, seen)
+        graphs.append(seen.genomes.graph)
+    checkpoints.save(state, experiment.creature.name, experiment.creature.digest)
+    checkpoints.close()
+    write_lines(run / METRICS, lines)
+    family = Family(run, lines)
+    for generation, graph in enumerate(graphs):
+        for place in range(60):
+            found = family.individual(generation, place)
+            assert found is not None
+            for name in ("half", "target", "used", "turn"):
+                recorded = found.body[f"graph.{name}"]
+                np.testing.assert_array_equal(recorded, getattr(graph, name)[place])
+    champion = experiment.champion(state, {})
+    write_champion(champion, champion.embodied(experiment.creature), run / CHAMPION)
+    births = family.line(3, 0)
+    assert births[0].operator == "first generation"
+    assert plot_command([str(run), "--family-tree", str(tmp_path / "tree.png")]) == 0
+    with Image.open(tmp_path / "tree.png") as poster:
+        assert poster.width > 700
+        assert len(poster.convert("RGB").getcolors(1 << 24) or ()) > 1000, "bodies are drawn"
 
 
 def test_a_modular_champion_survives_its_file(experiment: Experiment, evolved, tmp_path: Path):
