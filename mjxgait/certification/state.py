@@ -45,6 +45,6 @@ def certificate_state(
         return NoCertificate(Lack.UNREADABLE, str(error))
     if document is None:
         return NoCertificate(Lack.MISSING, "it has not been examined")
-    if old := None:
+    if old := outdated(document, champion, creature):
         return NoCertificate(Lack.OUTDATED, clause(old))
     return ValidCertificate(document, verdict_of(document))

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from mjxgait.champion import Champion
 from mjxgait.controllers.sims_brain.config import BrainConfig
@@ -100,7 +101,7 @@ class Tree:
                 place = (column * WIDTH, top - _height(row))
                 self._draw_step(drawing, step, number, place, bool(column))
             top -= _height(row)
-        box = (0.6 / width, 0.45 / height, 1 - 0.75 / width, (AXIS - 0.75) / height)
+        box = (0.75 / width, 0.45 / height, 1 - 0.9 / width, (AXIS - 0.75) / height)
         _draw_axis(drawing.add_axes(box), self.births, self.steps, lines)
 
     def _draw_step(
@@ -198,5 +199,6 @@ def _draw_axis(
         axes.plot(*at, "o", color=ACCENT, markersize=4)
         axes.annotate(str(number), at, (0, 5), textcoords="offset points", fontsize=7, ha="center")
     axes.set(xlabel="generation", ylabel="fitness", xlim=(-0.5, last + 0.5))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.margins(y=0.2)
     axes.legend(loc="lower right", fontsize=7)
