@@ -127,16 +127,8 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     source = source_of(path, choices.search, choices.up, choices.height, notes)
     model = _compiled(source, choices, notes)
     up = source.up.value if source.up else choices.up
-    anatomy = find_anatomy(
-        model,
-        source.coupled,
-        choices.keep,
-        choices.freeze,
-        up,
-        notes,
-        source.limbs,
-        source.swings,
-    )
+    keep = *choices.keep, *sorted(source.swings)
+    anatomy = find_anatomy(model, source.coupled, keep, choices.freeze, up, notes, source.limbs)
     if source.up:
         notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
     tell_left_out(model, anatomy.bodies, notes)
@@ -193,7 +185,7 @@ def _balance(best: Candidate, source: Source, root: str, planar: bool) -> None:
     if source.bones:
         step_if_narrow(body, best.q, best.drive, best.notes)
     arms = {name for name, arm in zip(body.names, body.arms, strict=True) if arm}
-    swing_arms(body, best.drive, arms, best.notes)
+    swing_arms(body, best.drive, source.swings | arms, best.notes)
 
 
 def _name(path: Path, choices: ImportChoices) -> str:

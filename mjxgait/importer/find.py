@@ -43,13 +43,12 @@ def find_anatomy(
     up: str | None,
     notes: Notes,
     limbs: frozenset[str] | None = None,
-    swings: frozenset[str] = frozenset(),
 ) -> Anatomy:
     """Find the anatomy of a compiled model.
 
     Args:
       coupled: names of joints that follow others. keep, freeze: patterns of joints that the user
-        wants active or frozen. limbs, swings: see `Source`.
+        wants active or frozen. limbs: see `Source`.
 
     Raises:
       UserError: the model is no creature that can walk; says why.
@@ -77,8 +76,6 @@ def find_anatomy(
             raise UserError(str(error)) from None
     if limbs is None:
         anatomy = _with_arms(model, anatomy, movable, axis, notes)
-    else:
-        anatomy.swinging = [j for j in movable if model.joint(j).name in swings]
     _choose_joints(model, anatomy, movable, keep, notes)
     _check_loops(model, anatomy)
     return anatomy

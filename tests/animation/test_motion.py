@@ -98,4 +98,4 @@ def test_the_player_in_c_sends_every_target(exported: Path, walk: Walk, tmp_path
 
 def test_an_unknown_ending_is_refused(capsys, tmp_path: Path):
     said = said_by(capsys, "export", RUN, "--out", tmp_path / "walk.xyz", code=2)
-    assert "end the name with .glb, .bvh, .usda, .usdc, .csv, .json" in said
+    assert "end the name with .glb, .fbx, .bvh, .usda, .usdc, .csv, .json" in said

@@ -71,14 +71,16 @@ class Places:
     bodies: np.ndarray
     bones: np.ndarray
 
-    def off(self) -> float:
-        """Largest distance in m, after the best rotation, scale and shift of all."""
+    def off(self) -> np.ndarray:
+        """Largest distance [B] in m of each part, after the best rotation, scale and shift of all."""
         own, other = (
             p.reshape(-1, 3) - p.reshape(-1, 3).mean(0) for p in (self.bodies, self.bones)
         )
         factor = np.sqrt((other**2).sum() / (own**2).sum())
         turn, _ = Rotation.align_vectors(own, other / factor)
-        return float(np.linalg.norm(own - turn.apply(other / factor), axis=1).max())
+        away = np.linalg.norm(own - turn.apply(other / factor), axis=1)
+        worst: np.ndarray = away.reshape(self.bodies.shape[:2]).max(0)
+        return worst
 
 
 def places_in(file: Path, loop: WalkLoop) -> Places:
@@ -110,7 +112,9 @@ def test_an_odd_character_moves_as_its_simulated_body(made: Callable[[], bytes],
     creature = load_files(import_model(file, ImportChoices(apart=False)).files)
     places = places_in(file, treading_loop(creature))
     assert np.ptp(places.bodies, axis=0).max() > 0.03 * creature.frame.hip_height
-    assert places.off() < 0.03 * creature.frame.hip_height  # a knee may bend more, for its foot
+    off = places.off() / creature.frame.hip_height
+    assert np.median(off) < 0.01
+    assert off.max() < 0.05  # a knee may bend more, for its foot
 
 
 def test_arms_of_an_a_pose_hang_in_its_walk(tmp_path: Path):
