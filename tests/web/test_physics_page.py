@@ -128,17 +128,18 @@ def slide(tab, slider, value):
 
 
 def test_the_floor_gets_rough_and_level_again(tab):
-    level = filled(drawn(tab))
+    drawn(tab)
+    until(lambda: filled(canvas(tab)) < 0.25)
     slide(tab, "rough", 15)
     assert tab.inner_text('output[for="rough"]') == "15 %"
     # Rough ground is a surface, the level floor a few tiles.
-    until(lambda: filled(canvas(tab)) > 3 * level)
+    until(lambda: filled(canvas(tab)) > 0.45)
     before = shown(tab)["time"]
     wait_until(tab, f"walk.dataset.time > {before + 0.3}")
     assert shown(tab)["lies"] is False
     tab.click("text=As evolved")
     assert tab.inner_text('output[for="rough"]') == "0 %"
-    until(lambda: filled(canvas(tab)) < 1.5 * level)
+    until(lambda: filled(canvas(tab)) < 0.25)
 
 
 def filled(picture):
