@@ -21,7 +21,7 @@ import numpy as np
 
 import mjxgait
 from mjxgait.certification import verdict_of
-from mjxgait.evolution.state import NO_MOTHER
+from mjxgait.evolution.state import NO_PARENT
 from mjxgait.training.folder import CERTIFICATE
 
 HEADER = ("run", "certified", "speed", "blocks", "hinges", "mass", "families", "one from")
@@ -90,7 +90,7 @@ def families(mothers: np.ndarray) -> list[int]:
     for of_generation in mothers[1:].astype(int):
         # An individual without a mother founds a family.
         first = ancestors.max() + 1 + np.arange(len(ancestors))
-        ancestors = np.where(of_generation == NO_MOTHER, first, ancestors[of_generation])
+        ancestors = np.where(of_generation == NO_PARENT, first, ancestors[of_generation])
         counts.append(len(set(ancestors.tolist())))
     return counts
 

@@ -35,6 +35,7 @@ def gallery(
     tell: Tell = lambda said: None,
 ) -> Path:
     """Write an offline page on which champions move side by side, by what they do; return it.
+
     Does the same as `mjxgait gallery`. Each has a word for how it moves (docs/guide/seeing.md).
 
     Args:

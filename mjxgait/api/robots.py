@@ -1,4 +1,4 @@
-"""A robot to build from a champion whose body grew, as on the command line."""
+"""A robot to build from a champion with a grown body, as on the command line."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -33,7 +33,7 @@ def build(
     Does the same as `mjxgait build`.
 
     Args:
-      run: a run whose body grew and walks or jumps.
+      run: of a grown body that walks or jumps.
       out: a new folder.
       length: cm, of the longest side of all blocks.
       wall: mm, thickness of the printed walls.

@@ -94,6 +94,7 @@ def ablate(
     quiet: bool = False,
 ) -> Path:
     """Run a study, variants times seeds side by side; return its report (docs/guide/studies.md).
+
     Does the same as `mjxgait ablate`. Beside report.md lie report.html, results.csv and
     generations.parquet.
 

@@ -1,4 +1,4 @@
-"""`mjxgait build`: a robot to build from a champion whose body grew."""
+"""`mjxgait build`: a robot to build from a champion with a grown body."""
 
 import dataclasses
 from collections.abc import Sequence

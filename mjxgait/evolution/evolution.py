@@ -15,8 +15,7 @@ import jax.numpy as jnp
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.evolution.offspring import Parents, children, forced
 from mjxgait.evolution.state import (
-    NO_FATHER,
-    NO_MOTHER,
+    NO_PARENT,
     EvolutionState,
     GenerationMetrics,
     Origin,
@@ -112,7 +111,7 @@ class Evolution:
             origin=kept(proposal.origin, state.origin),
             born=kept(proposal.born, state.born),
             mothers=None if mothers is None else kept(mothers, own),
-            fathers=None if fathers is None else kept(fathers, jnp.full_like(own, NO_FATHER)),
+            fathers=None if fathers is None else kept(fathers, jnp.full_like(own, NO_PARENT)),
         )
 
     def _again(self, state: EvolutionState) -> tuple[int, jax.Array]:
@@ -181,8 +180,8 @@ class Evolution:
             return None, None
         own = jnp.arange(self.config.population)
         mothers = jnp.append(own, proposal.mothers)[kept]
-        fathers = jnp.append(jnp.full_like(own, NO_FATHER), proposal.fathers)[kept]
-        return jnp.where(seeding, NO_MOTHER, mothers), jnp.where(seeding, NO_FATHER, fathers)
+        fathers = jnp.append(jnp.full_like(own, NO_PARENT), proposal.fathers)[kept]
+        return jnp.where(seeding, NO_PARENT, mothers), jnp.where(seeding, NO_PARENT, fathers)
 
     @property
     def _strategy(self) -> SeparableCma:
@@ -274,9 +273,9 @@ class Evolution:
         origin = pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
         if not self.config.follows or parents is None:
             return genomes, origin, None
-        (mothers, fathers), none = parents, jnp.full_like(origin, NO_FATHER)
-        of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NO_MOTHER, of_mutant)
-        mothers = pick(jnp.full_like(origin, NO_MOTHER), of_mutant, mothers)
+        (mothers, fathers), none = parents, jnp.full_like(origin, NO_PARENT)
+        of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NO_PARENT, of_mutant)
+        mothers = pick(jnp.full_like(origin, NO_PARENT), of_mutant, mothers)
         return genomes, origin, (mothers, pick(none, none, fathers))
 
     def _children(

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.evolution.breeding import SequentialBreeding, parents, proportional_parents
-from mjxgait.evolution.state import NO_FATHER, EvolutionState, Origin
+from mjxgait.evolution.state import NO_PARENT, EvolutionState, Origin
 from mjxgait.evolution.variation import Variation
 from mjxgait.types import choose
 
@@ -43,7 +43,7 @@ def children(
         ~crosses & (config.mutation_rate > 0)
     )
     origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
-    both = mothers, jnp.where(crosses, fathers, NO_FATHER)
+    both = mothers, jnp.where(crosses, fathers, NO_PARENT)
     return choose(mutates, mutated, child), origin, both
 
 

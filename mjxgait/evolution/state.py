@@ -12,10 +12,8 @@ from mjxgait.evolution.strategy import Normal
 from mjxgait.evolution.variation import first_occurrence
 from mjxgait.types import Evaluation, pytree
 
-NO_MOTHER = -1
-"""Mother's place of an individual without a mother, or with an unknown one."""
-NO_FATHER = -1
-"""Father's place of an individual with one parent or none."""
+NO_PARENT = -1
+"""Place of a mother or a father that an individual does not have, or that is unknown."""
 
 
 class Origin(IntEnum):
@@ -83,7 +81,7 @@ class GenerationMetrics:
     episodes that ended early. mothers: [P] places of the population, or of its mothers, in the
     generation before; fathers: [P] places there of the fathers of those born in this generation,
     else
-    `NO_FATHER`; None where that is not recorded. level: of the next generation's trials; None
+    `NO_PARENT`; None where that is not recorded. level: of the next generation's trials; None
     without a curriculum.
     """
 
@@ -114,7 +112,7 @@ class Proposal:
     """Offspring that a generation submits for evaluation.
 
     key: of the next generation. offspring: leaves [M, ...]; origin, born: [M]. mothers: [M] places
-    of their first parents, or `NO_MOTHER`; fathers: [M] of their second, or `NO_FATHER`; None where
+    of their first parents, or `NO_PARENT`; fathers: [M] of their second, or `NO_PARENT`; None where
     that is not recorded.
     """
 

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.traced import chosen
-from mjxgait.evolution.state import NO_MOTHER, EvolutionState, Proposal, admitted
+from mjxgait.evolution.state import NO_PARENT, EvolutionState, Proposal, admitted
 from mjxgait.evolution.variation import Variation, first_occurrence
 from mjxgait.types import Evaluation, Tree, pytree
 
@@ -54,7 +54,7 @@ def families(state: EvolutionState, mothers: jax.Array | None) -> jax.Array | No
     population, offspring = len(state.family), len(mothers)
     own = population + (state.generation + 2) * offspring + jnp.arange(offspring)
     theirs = state.family[jnp.maximum(mothers, 0)]
-    return jnp.append(state.family, jnp.where(mothers == NO_MOTHER, own, theirs))
+    return jnp.append(state.family, jnp.where(mothers == NO_PARENT, own, theirs))
 
 
 def place_in_family(family: jax.Array, rank: jax.Array, counts: jax.Array) -> jax.Array:

@@ -210,7 +210,7 @@ def hinge_names(parts: Sequence[Part]) -> list[tuple[str, int]]:
 def _motions(walk: Walk, parts: Sequence[Part]) -> dict[str, Motion]:
     """Return the motion of each hinge at its shaft, of the evolved body.
 
-    A hinge's damping is that of its motor, whose torque falls with speed, so the shaft gets the
+    A hinge's damping is that of its motor: its torque falls with speed, so the shaft gets the
     commanded torque less the damping. Its rotor's inertia is not counted.
     """
     film, joints = walk.trajectory, walk.creature.joints

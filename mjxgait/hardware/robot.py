@@ -5,7 +5,6 @@ Letters: `J` hinges, `P` parts, `T` control steps.
 
 import dataclasses
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
 
 import mujoco
 import numpy as np
@@ -18,6 +17,8 @@ from mjxgait.controllers.sims_brain.reference_body import (
     HARDEST,
     Part,
 )
+from mjxgait.controllers.sims_brain.reference_files import in_xml
+from mjxgait.creature.geometry import quaternion
 from mjxgait.hardware.design import PLASTIC, Block, Design, Similarity, hinge_names
 from mjxgait.reference.bodies import BLOWN_UP
 from mjxgait.reference.state import CONTACT_GAP
@@ -128,13 +129,13 @@ def model_xml(body: Body, step: float) -> str:
     time, size = body.scale.time, body.scale.length
     root = ET.Element("mujoco", model="robot")
     ET.SubElement(root, "compiler", angle="radian", balanceinertia="false")
-    option = {"timestep": f"{step * time:.9g}", "gravity": _text((0, 0, -GRAVITY))}
+    option = {"timestep": f"{step * time:.9g}", "gravity": in_xml((0, 0, -GRAVITY))}
     exact = {"iterations": "100", "ls_iterations": "50", "tolerance": "1e-8"}
     inner = ET.SubElement(root, "option", {**option, **exact})
     ET.SubElement(inner, "flag", eulerdamp="disable", autoreset="disable")
     solid = (*IMPEDANCE[:2], IMPEDANCE[2] * size, *IMPEDANCE[3:])
-    hard = {"solref": _text((HARDEST * step * time, 1.0)), "solimp": _text(solid)}
-    touch = {"friction": _text((FRICTION, 0.005, 0.0001)), **hard}
+    hard = {"solref": in_xml((HARDEST * step * time, 1.0)), "solimp": in_xml(solid)}
+    touch = {"friction": in_xml((FRICTION, 0.005, 0.0001)), **hard}
     assets, world = ET.SubElement(root, "asset"), ET.SubElement(root, "worldbody")
     plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": "1"}
     ET.SubElement(world, "geom", {"name": "floor", **plane, **touch})
@@ -144,18 +145,18 @@ def model_xml(body: Body, step: float) -> str:
     for number, part in enumerate(body.parts):
         name = f"part{number}"
         inside = world if part.parent < 0 else bodies[part.parent]
-        own = ET.SubElement(inside, "body", name=name, pos=_text(part.place * size))
+        own = ET.SubElement(inside, "body", name=name, pos=in_xml(part.place * size))
         if part.parent < 0:
             ET.SubElement(own, "freejoint", name="root")
         else:
-            own.set("quat", _text(_quaternion(part.axes)))
+            own.set("quat", in_xml(quaternion(part.axes)))
         for hinge, axis in enumerate(part.hinges):
             _with_hinge(own, motors, body, names.index(f"{name}_{hinge}"), axis, f"{name}_{hinge}")
         mass, centre, inertia = body.inertials[number]
-        full = _text(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
-        given = {"pos": _text(centre), "mass": f"{mass:.9g}", "fullinertia": full}
+        full = in_xml(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+        given = {"pos": in_xml(centre), "mass": f"{mass:.9g}", "fullinertia": full}
         ET.SubElement(own, "inertial", given)
-        ET.SubElement(assets, "mesh", name=name, vertex=_text(body.points[number].ravel()))
+        ET.SubElement(assets, "mesh", name=name, vertex=in_xml(body.points[number].ravel()))
         shape = {"type": "mesh", "mesh": name, "contype": "1", "conaffinity": "1", "mass": "0"}
         ET.SubElement(own, "geom", {"name": f"block{number}", **shape, **touch})
         bodies.append(own)
@@ -170,15 +171,15 @@ def _with_hinge(
     number = hinge_names(body.parts)[place][1]
     _, _, armature = body.scale.hinge(body.parts[number])
     stall, fastest, ends = body.drives[place]
-    joint = {"name": name, "axis": _text(np.eye(3)[axis]), "limited": "true"}
-    end = _text((SOFT_END * body.scale.time, 1.0))
-    joint |= {"range": _text(body.ranges[place]), "solreflimit": end}
+    joint = {"name": name, "axis": in_xml(np.eye(3)[axis]), "limited": "true"}
+    end = in_xml((SOFT_END * body.scale.time, 1.0))
+    joint |= {"range": in_xml(body.ranges[place]), "solreflimit": end}
     ET.SubElement(own, "joint", {**joint, "armature": f"{armature:.9g}", "damping": "0"})
     motor = {"name": name, "joint": name, "ctrllimited": "true", "ctrlrange": "-1 1"}
     motor |= {"gainprm": f"{stall:.9g}", "biastype": "affine"}
-    motor["biasprm"] = _text((0, 0, -stall / fastest))
+    motor["biasprm"] = in_xml((0, 0, -stall / fastest))
     if ends:
-        motor |= {"forcelimited": "true", "forcerange": _text((-stall, stall))}
+        motor |= {"forcelimited": "true", "forcerange": in_xml((-stall, stall))}
     ET.SubElement(motors, "general", motor)
 
 
@@ -306,13 +307,3 @@ def _brain(design: Design, step: float) -> BrainReference:
     return BrainReference(
         champion.genome, design.parts, hinges, step, settings.every, settings.skill
     )
-
-
-def _quaternion(axes: np.ndarray) -> np.ndarray:
-    found = np.zeros(4)
-    mujoco.mju_mat2Quat(found, np.ascontiguousarray(axes, float).reshape(9))
-    return found
-
-
-def _text(values: Iterable[float]) -> str:
-    return " ".join(f"{float(value):.9g}" for value in values)

@@ -168,7 +168,7 @@ def _ring(
 ) -> np.ndarray:
     """Return triangles [n, 3] between two loops in a plane, one around the other.
 
-    Both run counter-clockwise around the normal. The loop whose next corner comes first, in angle
+    Both run counter-clockwise around the normal. The loop with the nearer next corner, in angle
     around the inner loop's middle, advances.
     """
     middle = points[list(edge)].mean(axis=0)

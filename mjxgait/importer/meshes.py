@@ -29,7 +29,7 @@ def foreign(key: str) -> str:
 
 
 def with_y_up(assets: dict[str, bytes]) -> list[str]:
-    """Return the keys of the COLLADA meshes whose files say that y is up."""
+    """Return the keys of the COLLADA meshes in files that state y as up."""
     return [key for key in assets if foreign(key) == ".dae" and Y_UP.search(assets[key])]
 
 
@@ -91,7 +91,7 @@ def misfit(model: mujoco.MjModel) -> float:
     """Return how far in m the links' meshes are from the joints at their ends, summed over both.
 
     Robot viewers disagree on whether the up axis of a COLLADA file counts, and so do the files that
-    were made for them. Links whose meshes reach their joints say which.
+    were made for them. Where meshes reach the joints of their links, the choice is right.
     """
     ends: dict[int, list[np.ndarray]] = {}
     for body in range(1, model.nbody):

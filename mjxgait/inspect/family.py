@@ -1,4 +1,4 @@
-"""Family of an individual of a run whose bodies grow: its ancestors, mother by mother.
+"""Family of an individual with a grown body: its ancestors, mother by mother.
 
 Read from the parents in `metrics.jsonl` and the bodies in RUN/family (`training.family`).
 """
@@ -11,9 +11,9 @@ import numpy as np
 
 from mjxgait.controllers.sims_brain.reference_body import Part, grow
 from mjxgait.errors import UserError
-from mjxgait.evolution.state import NO_FATHER, NO_MOTHER, Origin
+from mjxgait.evolution.state import Origin
 from mjxgait.training.family import BODY, FAMILY, Newborns, read_newborns
-from mjxgait.training.logs import FATHERS, MOTHERS, Line
+from mjxgait.training.logs import FATHERS, MOTHERS, Line, parent
 
 Body = Mapping[str, np.ndarray]
 """Arrays that a body grows from, by dotted name."""
@@ -96,13 +96,12 @@ class Family:
         return Birth(child, mother, father if made in (CROSSED, GRAFTED) else None, made)
 
     def _one_before(self, child: Relative, key: str) -> Relative | None:
-        parent = self._parent(key, child.generation, child.place)
-        return self.individual(child.generation - 1, parent)
+        place = self._parent(key, child.generation, child.place)
+        return self.individual(child.generation - 1, place)
 
     def _parent(self, key: str, generation: int, place: int) -> int:
         """Return the place of a parent, or an individual's own, one generation before."""
-        places = self._lines.get(generation, {}).get(key, ())
-        return int(places[place]) if 0 <= place < len(places) else min(NO_MOTHER, NO_FATHER)
+        return parent(self._lines.get(generation, {}).get(key, ()), place)
 
     def _of(self, generation: int) -> Newborns | None:
         if generation not in self._newborns:

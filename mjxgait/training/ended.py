@@ -10,7 +10,7 @@ from typing import cast
 
 from rich.console import Console
 
-from mjxgait.certification import outdated, read_certificate, verdict_of
+from mjxgait.certification import Lack, NoCertificate, ValidCertificate, certificate_state
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -68,26 +68,27 @@ def _certified(run: Path, creature: Creature, config: Config, stored: Stored) ->
     generation = stored.manifest.generation
     if generation != stored_generations(run)[-1] or not due(config.examination, generation):
         return None
-    try:
-        document = read_certificate(run / CERTIFICATE)
-        if document is None or outdated(document, kept_champion(run, creature), creature):
-            return None
-    except UserError:
+    state = _state(run, creature)
+    if not isinstance(state, ValidCertificate) or not state.verdict.certified:
         return None
-    verdict = verdict_of(document)
-    return why_ended(generation, verdict.margin) if verdict.certified else None
+    return why_ended(generation, state.verdict.margin)
 
 
 def _examined(run: Path, creature: Creature, config: Config) -> bool:
     """Return whether the champion exists, with its certificate if the settings require one."""
+    state = _state(run, creature)
+    if isinstance(state, NoCertificate) and state.lack == Lack.MISSING:
+        return config.examination.candidates == 0
+    return isinstance(state, ValidCertificate)
+
+
+def _state(run: Path, creature: Creature) -> ValidCertificate | NoCertificate | None:
+    """Return what the certificate says of the run's champion; None without a champion."""
     try:
         champion = kept_champion(run, creature)
-        document = read_certificate(run / CERTIFICATE)
     except UserError:
-        return False
-    if document is None:
-        return config.examination.candidates == 0
-    return outdated(document, champion, creature) is None
+        return None
+    return certificate_state(run / CERTIFICATE, champion, creature)
 
 
 def _to_continue(run: Path, config: Config, stored: Stored) -> str:

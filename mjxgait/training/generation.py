@@ -15,8 +15,7 @@ import numpy as np
 from mjxgait.config.schema import Config
 from mjxgait.evolution.evolution import Evolution
 from mjxgait.evolution.state import (
-    NO_FATHER,
-    NO_MOTHER,
+    NO_PARENT,
     EvolutionState,
     GenerationMetrics,
     Proposal,
@@ -105,9 +104,9 @@ def with_migrants(sources: jax.Array, states: EvolutionState, proposals: Proposa
 
     mothers, fathers = proposals.mothers, proposals.fathers
     if mothers is not None:
-        mothers = seated(mothers, jnp.full_like(states.origin, NO_MOTHER))
+        mothers = seated(mothers, jnp.full_like(states.origin, NO_PARENT))
     if fathers is not None:
-        fathers = seated(fathers, jnp.full_like(states.origin, NO_FATHER))
+        fathers = seated(fathers, jnp.full_like(states.origin, NO_PARENT))
     return dataclasses.replace(
         proposals,
         offspring=jax.tree.map(seated, proposals.offspring, states.genomes),

@@ -10,7 +10,7 @@ import numpy as np
 import pydantic
 
 from mjxgait.config.tables import STORED, Flag, Index, Number, check
-from mjxgait.evolution.state import NO_MOTHER
+from mjxgait.evolution.state import NO_PARENT
 from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, write_text
 from mjxgait.training.disk import disk_errors
 
@@ -105,12 +105,15 @@ def mothers_line(lines: Sequence[Mapping[str, Any]], generation: int, place: int
     """
     known = {line["generation"]: line[MOTHERS] for line in lines if MOTHERS in line}
     found = {generation: place}
-    while (mother := _mother(known.get(generation, ()), place)) != NO_MOTHER:
+    while (mother := parent(known.get(generation, ()), place)) != NO_PARENT:
         generation, place = generation - 1, mother
         found[generation] = place
     return found
 
 
-def _mother(places: Sequence[int], place: int) -> int:
-    """Return the place of an individual's mother; `NO_MOTHER` if the log does not have it."""
-    return places[place] if 0 <= place < len(places) else NO_MOTHER
+def parent(places: Sequence[int], place: int) -> int:
+    """Return the place of a parent of an individual; `NO_PARENT` if the log does not have it.
+
+    places: of all mothers, or of all fathers, of a generation.
+    """
+    return places[place] if 0 <= place < len(places) else NO_PARENT

@@ -19,8 +19,7 @@ from mjxgait.evolution.breeding import parents, proportional_parents
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.evolution import Evolution
 from mjxgait.evolution.state import (
-    NO_FATHER,
-    NO_MOTHER,
+    NO_PARENT,
     EvolutionState,
     GenerationMetrics,
     Origin,
@@ -281,7 +280,7 @@ def test_place_in_lineage_follows_rank():
 
 def test_each_immigrant_starts_a_lineage():
     state = dataclasses.replace(begun(toy(**SPARING)), family=jnp.arange(20) // 2)
-    mothers = jnp.array([4, NO_MOTHER, 5, NO_MOTHER])
+    mothers = jnp.array([4, NO_PARENT, 5, NO_PARENT])
     old, new = np.split(np.asarray(families(state, mothers)), [20])
     assert (old == np.arange(20) // 2).all()
     assert new[[0, 2]].tolist() == [2, 2]
@@ -500,7 +499,7 @@ def test_the_log_names_each_individuals_mother():
     """Mutants of one joint resemble their mother more than any other individual."""
     following = toy(crossover=0.0, mutation="single", forced=NEVER)
     history, children = run(following, 12), 0
-    assert (history[0][1].mothers == NO_MOTHER).all()
+    assert (history[0][1].mothers == NO_PARENT).all()
     for (before, _), (after, metrics) in itertools.pairwise(history):
         mothers = before.genomes.key_poses[metrics.mothers]
         changed = (after.genomes.key_poses != mothers).sum(axis=(1, 2))
@@ -516,10 +515,10 @@ def test_the_log_names_the_father_of_each_child_of_two():
     """Without mutation each gene of such a child is one of its two parents'."""
     history = run(toy(crossover=1.0, mutation_rate=0.0, forced=NEVER), 8)
     children = of_father = 0
-    assert (history[0][1].fathers == NO_FATHER).all()
+    assert (history[0][1].fathers == NO_PARENT).all()
     for (before, _), (after, metrics) in itertools.pairwise(history):
         born = after.born == after.generation
-        assert (metrics.fathers[~born] == NO_FATHER).all()
+        assert (metrics.fathers[~born] == NO_PARENT).all()
         assert (metrics.fathers[born] != metrics.mothers[born]).all()
         mine = after.genomes.key_poses[born]
         hers, his = (
@@ -534,7 +533,7 @@ def test_the_log_names_the_father_of_each_child_of_two():
 
 def test_a_child_of_one_parent_has_no_father():
     for _, metrics in run(toy(crossover=0.0, forced=NEVER), 4):
-        assert (metrics.fathers == NO_FATHER).all()
+        assert (metrics.fathers == NO_PARENT).all()
 
 
 def test_a_growing_pool_evolves_and_simulates_no_genome_twice():

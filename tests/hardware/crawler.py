@@ -1,4 +1,4 @@
-"""A body of five blocks whose brain observes angles and contacts, and a short motion of it."""
+"""A body of five blocks with a brain that observes angles and contacts, and a short motion of it."""
 
 import functools
 

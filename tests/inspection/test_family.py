@@ -61,7 +61,7 @@ STATES = [
     state(2, [0.21, 0.05], [1, 2], [Origin.MUTATION, Origin.CROSSOVER]),
     state(3, [0.05, 0.21], [2, 1], [Origin.CROSSOVER, Origin.MUTATION]),
 ]
-"""The second is the mother of the first child, whose child is the best of the last generation."""
+"""The second is the mother of the first child, the mother of the last generation's best."""
 
 
 @pytest.fixture

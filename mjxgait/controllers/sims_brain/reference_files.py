@@ -47,14 +47,14 @@ def body_xml(
     """
     root = ET.Element("mujoco", model="blocks")
     ET.SubElement(root, "compiler", angle="radian")
-    down = _text((0, 0, -gravity))
+    down = in_xml((0, 0, -gravity))
     option = ET.SubElement(root, "option", timestep=f"{step:g}", gravity=down)
     ET.SubElement(option, "flag", eulerdamp="disable")
     world = ET.SubElement(root, "worldbody")
     sticking = {}
     if friction is not None:
-        hard = {"solref": _text((HARDEST * step, 1.0))}
-        sticking = {"friction": _text((friction, SPIN, ROLL)), **hard}
+        hard = {"solref": in_xml((HARDEST * step, 1.0))}
+        sticking = {"friction": in_xml((friction, SPIN, ROLL)), **hard}
     touched = "0" if friction is None else "1"
     plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": touched}
     ET.SubElement(world, "geom", {"name": "floor", **plane, **sticking})
@@ -67,7 +67,7 @@ def body_xml(
         standing += _with_body(world, opponent, facing, sticking, THEIRS)
         standing += _with_cube(world, middle, sticking)
     if keyframe:
-        place = _text(standing)
+        place = in_xml(standing)
         ET.SubElement(ET.SubElement(root, "keyframe"), "key", name=keyframe, qpos=place)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")
@@ -85,11 +85,11 @@ def _with_body(
     for number, part in enumerate(parts):
         name = f"{prefix}part{number}"
         if part.parent < 0:
-            at = {"pos": _text(start[:3]), "quat": _text(start[3:])}
+            at = {"pos": in_xml(start[:3]), "quat": in_xml(start[3:])}
             own = ET.SubElement(world, "body", {"name": name, **at})
             ET.SubElement(own, "freejoint", name=f"{prefix}root")
         else:
-            at = {"pos": _text(part.place), "quat": _text(_quaternion(part.axes))}
+            at = {"pos": in_xml(part.place), "quat": in_xml(_quaternion(part.axes))}
             own = ET.SubElement(bodies[part.parent], "body", {"name": name, **at})
         _with_joints_and_block(own, number, part, sticking, prefix)
         bodies.append(own)
@@ -99,9 +99,9 @@ def _with_body(
 def _with_cube(world: ET.Element, ahead: float, sticking: dict[str, str]) -> tuple[float, ...]:
     """Add the cube on the floor; return its position."""
     half = CUBE / 2
-    own = ET.SubElement(world, "body", name=CUBE_NAME, pos=_text((ahead, 0, half)))
+    own = ET.SubElement(world, "body", name=CUBE_NAME, pos=in_xml((ahead, 0, half)))
     ET.SubElement(own, "freejoint", name=CUBE_NAME)
-    shape = {"name": CUBE_NAME, "type": "box", "size": _text((half, half, half))}
+    shape = {"name": CUBE_NAME, "type": "box", "size": in_xml((half, half, half))}
     solid = {"density": f"{CUBE_DENSITY:g}", "contype": "1", "conaffinity": "1"}
     ET.SubElement(own, "geom", {**shape, **solid, **sticking})
     return ahead, 0.0, half, 1.0, 0.0, 0.0, 0.0
@@ -116,17 +116,17 @@ def _with_joints_and_block(
             own,
             "joint",
             name=f"{prefix}part{number}_{hinge}",
-            axis=_text(np.eye(3)[axis]),
+            axis=in_xml(np.eye(3)[axis]),
             limited="true",
-            range=_text((-swing, swing)),
-            armature=_text((ROTOR * damping,)),
-            damping=_text((damping,)),
+            range=in_xml((-swing, swing)),
+            armature=in_xml((ROTOR * damping,)),
+            damping=in_xml((damping,)),
         )
     block = {
         "name": f"{prefix}block{number}",
         "type": "box",
-        "size": _text(part.half),
-        "pos": _text(part.middle),
+        "size": in_xml(part.half),
+        "pos": in_xml(part.middle),
         "density": f"{DENSITY:g}",
         "contype": "1",
         "conaffinity": "1",
@@ -140,7 +140,8 @@ def _quaternion(axes: np.ndarray) -> np.ndarray:
     return found
 
 
-def _text(values: Iterable[float]) -> str:
+def in_xml(values: Iterable[float]) -> str:
+    """Return numbers as an attribute of MuJoCo's XML."""
     return " ".join(f"{float(value):.9g}" for value in values)
 
 
