@@ -20,7 +20,7 @@ class ShareOptions:
       run: Run folder, or the folder of a repertoire.
       out: File to write, ending with .html.
       physics: A page that simulates the champion instead of playing its walk: pull it, push it,
-        tilt the floor. For key poses, expressions and brains. It contains MuJoCo's WebAssembly
+        tilt the floor. For key poses, expressions, networks and brains. It contains MuJoCo's WebAssembly
         build, which npm fetches once.
       wasm: Folder of the unpacked npm package @mujoco/mujoco, instead of npm.
     """
