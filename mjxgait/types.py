@@ -14,7 +14,7 @@ import numpy as np
 
 T = TypeVar("T")
 Tree = TypeVar("Tree")
-"""A pytree of a kind that only its maker knows."""
+"""A pytree of any structure."""
 Number = jax.Array | np.ndarray
 """A NumPy array is a constant of the program."""
 

@@ -194,7 +194,7 @@ def _skeleton(
             dartpy.dynamics.Inertia(float(model.body_mass[body]), model.body_ipos[body], inertia)
         )
         nodes[body] = node
-    for geom in creature.feet.watched[: len(creature.feet.foot_of)]:
+    for geom in creature.feet.stepping:
         _sphere(nodes[int(model.geom_bodyid[geom])], model, int(geom))
     return skeleton, nodes
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from mjxgait.api.run import Place
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, writing
 from mjxgait.importer import TOML, WRITTEN, ImportChoices, Imported
@@ -96,6 +96,6 @@ def write_folder(folder: Path, imported: Imported) -> None:
     Raises:
       UserError: the texts are not a creature, or the folder cannot be written.
     """
-    load_files(imported.files)
+    creature_of(imported.files)
     with writing(folder):
         write_creature(folder, imported.files)

@@ -16,6 +16,9 @@ from mjxgait.training.exams import Exams
 from mjxgait.training.folder import CERTIFICATE, EXAMS, command
 from mjxgait.training.skill_runs import write_skill_runs
 
+LONGEST = 600
+"""Longest recorded motion in s."""
+
 
 def certify(run: Run | Place, config: Place | None = None) -> Certificate:
     """Examine the champion of a run in C MuJoCo, and write `certificate.json` of the run.
@@ -117,8 +120,8 @@ def walk(run: Run | Place, seconds: float = 12.0) -> dict[str, np.ndarray]:
     from mjxgait.rendering.walk import record_walk
 
     known = opened(run)
-    if not seconds > 0:
-        raise UserError(f"seconds = {seconds}: must be more than zero")
+    if not 0 < seconds <= LONGEST:
+        raise UserError(f"seconds = {seconds}: must be more than zero, and at most {LONGEST}")
     creature = known.creature
     seen = record_walk(creature, known.champion, seconds).recording
     columns = {"time": np.arange(len(seen.pitch)) * seen.time_step}

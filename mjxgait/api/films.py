@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from mjxgait.api.exports import Tell, folder_of, sized
-from mjxgait.api.run import Place, Run
+from mjxgait.api.run import Place, Run, runs_of
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, replaced, writing
 
@@ -82,9 +82,8 @@ def render(
     Raises:
       UserError: no champion, an invalid argument, or the file cannot be written.
     """
-    several = [run] if isinstance(run, Run | str | Path) else run
     film = Film(
-        runs=tuple(map(folder_of, several)),
+        runs=tuple(map(folder_of, runs_of(run))),
         out=path_of(out),
         top=top,
         generations=",".join(map(str, generations)) if generations else None,
@@ -154,7 +153,7 @@ def _check(film: Film) -> list[int]:
         ("slow", film.slow, 0.1, 100),
         ("size", min(film.size or SIZE), 64, 4096),
         ("size", max(film.size or SIZE), 64, 4096),
-        ("top", film.top or 1, 1, MOST_RUNNERS),
+        ("top", 1 if film.top is None else film.top, 1, MOST_RUNNERS),
     ):
         if not low <= value <= high:
             raise UserError(f"--{name} {value:.10g}: must lie between {low} and {high}")
@@ -166,14 +165,12 @@ def _check(film: Film) -> list[int]:
         raise UserError("--renderer gl draws no transparent background; leave out one of the two")
     if film.top and film.generations:
         raise UserError("--top and --generations are two kinds of race; name one of them")
+    text = film.generations
     try:
-        generations = (
-            [int(part) for part in film.generations.split(",")] if film.generations else []
-        )
+        generations = [] if text is None else [int(part) for part in text.split(",")]
     except ValueError:
         raise UserError(
-            f"--generations {film.generations}: must be numbers with commas between them, such "
-            "as 0,5,20"
+            f"--generations {text}: must be numbers with commas between them, such as 0,5,20"
         ) from None
     if len(generations) > MOST_RUNNERS:
         raise UserError(f"--generations: at most {MOST_RUNNERS} can race")

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mjxgait.api.exports import PAGES, Tell, folder_of, sized
-from mjxgait.api.run import Place, Run
+from mjxgait.api.run import Place, Run, runs_of
 from mjxgait.api.studies import STUDY, champions_of_study
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, require_ending
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from mjxgait.creature import Creature
     from mjxgait.rendering.gallery import Entry
 
-MOST = 60
+MAX_CHAMPIONS = 60
 """Largest number of champions on a page."""
 STILLS = (".webp", ".png", ".jpg")
 UNEXAMINED = "Not certified: a study keeps no certificates"
@@ -52,8 +52,7 @@ def gallery(
     page, still = path_of(out), None if poster is None else path_of(poster)
     film = None if video is None else path_of(video)
     check_files(page, still, film)
-    several = [runs] if isinstance(runs, Run | str | Path) else runs
-    shown = entries_of(map(folder_of, several), tell)
+    shown = entries_of(map(folder_of, runs_of(runs)), tell)
     from mjxgait.rendering.gallery import tally
     from mjxgait.web.gallery import build_gallery
     from mjxgait.web.page import save_page
@@ -100,9 +99,10 @@ def entries_of(folders: Iterable[Path], tell: Tell) -> "list[Entry]":
     count = len(runs) + len(studied)
     if not count:
         raise UserError("gallery: no run has a champion yet; name runs that have ended")
-    if count > MOST:
+    if count > MAX_CHAMPIONS:
         raise UserError(
-            f"gallery: {count} champions; a page shows at most {MOST}; name fewer runs or studies"
+            f"gallery: {count} champions; a page shows at most {MAX_CHAMPIONS}; name fewer runs or "
+            "studies"
         )
     shown = []
     for name, run in zip(_names(runs), runs, strict=True):

@@ -1,4 +1,4 @@
-"""Runs made and looked at: training, refining, examination, motion as numbers."""
+"""New runs: training and refining, and the creatures that they begin with."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -14,7 +14,8 @@ from mjxgait.config.schema import Config
 from mjxgait.config.tables import Table, build, merge, not_none, read_toml
 from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
-from mjxgait.creature.scale import at_step, facing, load_files, scaled
+from mjxgait.creature.load import creature_of
+from mjxgait.creature.scale import at_step, facing, scaled
 from mjxgait.errors import UserError
 from mjxgait.files import path_of
 from mjxgait.training.folder import check_run, create_run
@@ -51,7 +52,7 @@ def load_creature(
     else:
         imported = import_model(path)
         tell(imported.notes.text())
-        creature = load_files(imported.files)
+        creature = creature_of(imported.files)
     return facing(scaled(creature, scale or {}), way)
 
 

@@ -12,18 +12,18 @@ from rich.console import Console
 from mjxgait.animation import Rate
 from mjxgait.api.make import load_creature
 from mjxgait.api.progress import Progress, pace
+from mjxgait.api.requests import check_resumed
 from mjxgait.api.run import Place
 from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import build, merge, not_none
 from mjxgait.creature import Creature
-from mjxgait.errors import UserError
 from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
 from mjxgait.files import path_of, replaced, write_text
 from mjxgait.output import Output
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import WalkTargets, speed_of, with_targets
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import check_free, check_parts, create_run, open_run
+from mjxgait.training.folder import check_free, check_parts, command, create_run, open_run
 from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class RepertoireRequest:
 def repertoire(
     env: Place = "tall_quadruped",
     *,
-    speeds: Sequence[str] = SPEEDS,
+    speeds: Sequence[str | float] = SPEEDS,
     turns: Sequence[float] = TURNS,
     gait: str | None = None,
     style: Place | None = None,
@@ -133,7 +133,7 @@ def repertoire(
     """
     request = RepertoireRequest(
         env=str(env),
-        speeds=tuple(speeds),
+        speeds=tuple(map(str, speeds)),
         turns=tuple(turns),
         gait=gait,
         style=None if style is None else str(style),
@@ -147,13 +147,13 @@ def repertoire(
         onto=None if onto is None else path_of(onto),
         blends=blends,
     )
-    folder, ended = gather(request, Output(Console(quiet=True) if quiet else None))
+    folder, ended = evolve_repertoire(request, Output(Console(quiet=True) if quiet else None))
     if not ended:
         raise KeyboardInterrupt
     return folder
 
 
-def gather(request: RepertoireRequest, output: Output) -> tuple[Path, bool]:
+def evolve_repertoire(request: RepertoireRequest, output: Output) -> tuple[Path, bool]:
     """Evolve or continue a repertoire; return its folder, and whether it came to its end.
 
     Raises:
@@ -170,6 +170,8 @@ def gather(request: RepertoireRequest, output: Output) -> tuple[Path, bool]:
 
     prepare_devices(1 if request.cluster else None)
     began, screen = time.perf_counter(), _Screen(output)
+    first = folder / grid.cells[0].name
+    again = command("repertoire", "--resume", folder, run=first)
     with (
         interruptible() as interrupted,
         scheduler_at(request.cluster, output.progress) as scheduler,
@@ -177,17 +179,17 @@ def gather(request: RepertoireRequest, output: Output) -> tuple[Path, bool]:
         if plan is not None:
             begin(plan)
         with locked(folder):
-            creature, stopped = open_run(folder / grid.cells[0].name)[0], interrupted.is_set
+            creature, stopped = open_run(first)[0], interrupted.is_set
             character = _character(request.onto, creature)
             ended = evolve(folder, creature, grid, scheduler, screen.evolved, stopped)
             walks = [folder / cell.name for cell in grid.cells]
-            again = f"mjxgait repertoire --resume {folder}"
             ended = ended and examine(folder, walks, again, screen.examined, stopped)
     if not ended:
-        output.console.print(f"interrupted; go on with: mjxgait repertoire --resume {folder}")
+        output.console.print(f"interrupted; go on with: {again}")
         return folder, False
     _leave(folder, creature, grid, request, screen, character)
-    output.say(f"{time.perf_counter() - began:.0f} s; each walk is a run: mjxgait inspect {folder}")
+    look = command("inspect", folder, run=first)
+    output.say(f"{time.perf_counter() - began:.0f} s; each walk is a run: {look}")
     return folder, True
 
 
@@ -262,13 +264,9 @@ def _character(onto: Path | None, creature: Creature) -> "Character | None":
 def _resumed(options: RepertoireRequest) -> tuple[Path, Grid]:
     folder = options.resume
     assert folder is not None
-    grid, plain = Grid.read(folder), RepertoireRequest()
-    free = {name: getattr(plain, name) for name in ("resume", *OF_FILES)}
-    if dataclasses.replace(options, **free) != plain:
-        raise UserError(
-            f"{folder}: a resumed repertoire keeps its walks and their settings; only "
-            f"--{', --'.join(OF_FILES)} may be given"
-        )
+    grid = Grid.read(folder)
+    kept = "a resumed repertoire keeps its walks and their settings"
+    check_resumed(options, folder, OF_FILES, kept)
     return folder, grid
 
 

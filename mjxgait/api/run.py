@@ -2,6 +2,7 @@
 
 import dataclasses
 import html
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -121,7 +122,12 @@ class Run:
         return _pandas().DataFrame(rows, columns=columns).set_index("generation")
 
 
-def frames(runs: Iterable[Run | Place]) -> "pandas.DataFrame":
+def runs_of(given: Run | Place | Iterable[Run | Place]) -> Iterable[Run | Place]:
+    """Return the runs that are given as one or several."""
+    return [given] if isinstance(given, Run | str | os.PathLike) else given
+
+
+def frames(runs: Run | Place | Iterable[Run | Place]) -> "pandas.DataFrame":
     """Return the metrics of several runs as one table; see `Run.frame`.
 
     The index has the levels `run`, the folder, and `generation`; a column `seed` comes first.
@@ -129,12 +135,12 @@ def frames(runs: Iterable[Run | Place]) -> "pandas.DataFrame":
     Raises:
       UserError: see `Run.frame`; a folder is no run, or there is none.
     """
-    known = [opened(one) for one in runs]
+    known = {str(run.folder): run for run in map(opened, runs_of(runs))}
     if not known:
         raise UserError("frames: there is no run; name at least one run folder")
-    tables = {str(one.folder): one.frame() for one in known}
-    for one in known:
-        tables[str(one.folder)].insert(0, "seed", one.config.seed)
+    tables = {name: run.frame() for name, run in known.items()}
+    for name, run in known.items():
+        tables[name].insert(0, "seed", run.config.seed)
     return _pandas().concat(tables, names=["run"])
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from mjxgait.api.progress import Progress
+from mjxgait.api.requests import check_resumed
 from mjxgait.api.run import Place
 from mjxgait.champion import Champion, read_champion
 from mjxgait.config.layers import find_creature
@@ -26,7 +27,7 @@ from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, write_text, writing
 from mjxgait.output import Output, duration
-from mjxgait.training.folder import CREATURE, check_free, write_creature
+from mjxgait.training.folder import CREATURE, check_free, command, write_creature
 from mjxgait.training.lock import locked
 
 if TYPE_CHECKING:
@@ -127,7 +128,7 @@ def ablate(
     output = Output(Console(quiet=True) if quiet else None)
     planned = prepared(request)
     output.say(planned.words)
-    report = finished(planned, request, output)
+    report = evolve_study(planned, request, output)
     if report is None:
         raise KeyboardInterrupt
     return report
@@ -160,6 +161,9 @@ def prepared(options: AblateRequest) -> Prepared:
         raise UserError(f"--hours {options.hours:g}: must be above zero")
     name = options.study.stem if options.study else ""
     folder = options.resume or options.out or Path("runs") / f"ablate-{name}"
+    if options.resume:
+        kept = "a resumed study keeps its runs and their settings"
+        check_resumed(options, options.resume, ("hours", "cluster"), kept)
     study, creature = _open(folder) if options.resume else _read(options)
     where = str(options.study or folder / STUDY)
     plan = make_plan(study, creature, where)
@@ -178,7 +182,8 @@ def prepared(options: AblateRequest) -> Prepared:
         f"{len(parts)} program{'s' if len(parts) > 1 else ''}; at most "
         f"{steps / 1e6:.0f} M creature-steps, about {duration(3600 * hours)} at most on two cores"
     )
-    if hours > options.hours:
+    # A resumed study was allowed when it began.
+    if hours > options.hours and not options.resume:
         raise UserError(
             f"this study may take {hours:.0f} hours; take fewer --seeds or --generations, or allow "
             f"it with --hours {math.ceil(hours)}"
@@ -186,7 +191,7 @@ def prepared(options: AblateRequest) -> Prepared:
     return Prepared(folder, study, creature, plan, parts, words)
 
 
-def finished(planned: Prepared, options: AblateRequest, output: Output) -> Path | None:
+def evolve_study(planned: Prepared, options: AblateRequest, output: Output) -> Path | None:
     """Run or continue a study and print its report; return that file, None if interrupted.
 
     Raises:
@@ -204,11 +209,12 @@ def finished(planned: Prepared, options: AblateRequest, output: Output) -> Path 
             check_spec(creature, runs[0].config)
         begin = partial(_create, folder, planned.study, creature)
     if not _run(folder, creature, plan, screen, options.cluster, begin):
-        output.console.print(f"interrupted; go on with: mjxgait ablate --resume {folder}")
+        again = command("ablate", "--resume", folder, run=folder)
+        output.console.print(f"interrupted; go on with: {again}")
         return None
     results = measure(folder, plan, screen.examined)
-    command = shlex.join(["mjxgait", "ablate", *_repeatable(options)])
-    report = write_report(folder, plan, results, read_logs(folder), command)
+    typed = shlex.join(["mjxgait", "ablate", *_repeatable(options)])
+    report = write_report(folder, plan, results, read_logs(folder), typed)
     output.console.print(report.read_text(encoding="utf-8"))
     output.console.print(f"report        {report}, {report.with_suffix('.html')}")
     return report

@@ -27,7 +27,7 @@ from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.starts import Starts
 
 Wish = Mapping[str, Any]
-"""Requested targets by name, as in a champion's file; a task knows the types of its own."""
+"""Requested targets by name, as in a champion's file; each task defines the types of its own."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -124,7 +124,9 @@ class AcceptanceCriteria(Protocol):
         """Mask [S] of simulations from perturbed starts that met the task's criteria."""
         ...
 
-    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+    def lost(
+        self, outcome: Outcome, starts: Starts, steps: int, config: CertificateConfig
+    ) -> np.ndarray:
         """Mask [S] of simulations that can no longer succeed after so many control steps."""
         ...
 
@@ -206,7 +208,9 @@ class WithoutTargets:
         """Keep the goals."""
         return goal
 
-    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+    def lost(
+        self, outcome: Outcome, starts: Starts, steps: int, config: CertificateConfig
+    ) -> np.ndarray:
         """Mask of the simulations that are down."""
         return ~outcome.stayed_up
 
@@ -305,7 +309,7 @@ def acceptance_of(task: str, wish: Wish | None = None) -> AcceptanceCriteria:
     return _made(task_kind(task)).with_targets(wish or {})
 
 
-def how_simulated(task: str, wish: Wish | None = None) -> AcceptanceCriteria | StaysUp:
+def task_rules(task: str, wish: Wish | None = None) -> AcceptanceCriteria | StaysUp:
     """Return a task's goals, falls and turns for a simulation; the usual ones if it is unknown."""
     kind = known_task(task)
     return (_made(kind) if kind else StaysUp()).with_targets(wish or {})

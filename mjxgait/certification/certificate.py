@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mjxgait.certification import criteria, trials
-from mjxgait.certification.acceptance import acceptance_of, how_simulated
+from mjxgait.certification.acceptance import acceptance_of, task_rules
 from mjxgait.certification.advice import FELL_AFTER, advised
 from mjxgait.certification.check_body import check_body
 from mjxgait.certification.config import CertificateConfig
@@ -172,7 +172,8 @@ def certify(
     config = config or CertificateConfig()
     began = time.perf_counter()
     seen = seen or nominal_check(creature, champion, config)
-    draw, acceptance = trials.own(champion, config), acceptance_of(champion.task, champion.wish)
+    draw = trials.own_draw(champion, config)
+    acceptance = acceptance_of(champion.task, champion.wish)
     disturbed = trials.starts(creature, config, draw, config.starts.count)
     groups = [
         nominal_starts(creature, 1),
@@ -228,7 +229,7 @@ def recordings(
     creature: Creature, champion: Champion, seconds: float, starts: Starts
 ) -> list[Recording]:
     """Record and measure walks from some starts; overlap of parts only at the usual time step."""
-    task = how_simulated(champion.task, champion.wish)
+    task = task_rules(champion.task, champion.wish)
     starts = task.aimed(starts, CertificateConfig())
     count, drag = len(starts), task.drag if task.grown else None
     film = simulate(creature, champion, starts, seconds, record=count, threads=1).trajectory
@@ -263,9 +264,9 @@ def push_ladder(
 
     Push speeds are in units of sqrt(g * hip height).
     """
-    groups = trials.ladder(creature, config, trials.common(config))
-    starts = acceptance_of(champion.task, champion.wish).aimed(join(*groups), config)
-    fall = acceptance_of(champion.task, champion.wish).fall(config)
+    groups = trials.ladder(creature, config, trials.common_draw(config))
+    acceptance = acceptance_of(champion.task, champion.wish)
+    starts, fall = acceptance.aimed(join(*groups), config), acceptance.fall(config)
     outcome = simulate(creature, champion, starts, config.seconds, fall=fall)
     return dict(
         zip(
@@ -304,7 +305,7 @@ def _fell(times: np.ndarray) -> dict[str, object]:
 
 def schema_of(task: str) -> int:
     """Version of `certificate.json` for a task; a certificate of another version is outdated."""
-    return SCHEMA + how_simulated(task).revision
+    return SCHEMA + task_rules(task).revision
 
 
 def _entry(measure: criteria.Measure) -> MeasureEntry:

@@ -249,9 +249,9 @@ class _Body:
                     )
 
     def _parts(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Place of each joint [J, 3], m from the trunk; rotation [J, 3, 3] of the body it moves;
-        its axis [J, 3].
+        """Return place, rotation and axis of each joint.
 
+        Place [J, 3] in m from the trunk; rotation [J, 3, 3] of the body that it moves; axis [J, 3].
         Joints are compared, not centres of mass, which may differ between the sides.
         """
         qpos = self.stand.copy()

@@ -212,7 +212,7 @@ def obstacle(whole: Recording, config: CertificateConfig) -> str | None:
         when = "in the first second, " if fell < 1 else ""
         return f"fell {when}after {fell:.1f} s"
     seconds = (len(whole.trunk_pos) - 1) * whole.time_step
-    way = float(whole.trunk_pos[-1, 0] - whole.trunk_pos[0, 0])
+    way = distance(whole)
     due = config.progress.speed * whole.dimensions.body_length * seconds
     if abs(way) < LEFT * due:
         return f"never left its place: {way:.2f} m in {seconds:.0f} s"

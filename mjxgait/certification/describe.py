@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mjxgait.certification.config import GaitConfig
-from mjxgait.certification.criteria import Measure, at_most, speed
+from mjxgait.certification.criteria import Measure, at_most, distance, speed
 from mjxgait.reference.measure import (
     Dimensions,
     Recording,
@@ -200,7 +200,7 @@ def cost_of_transport(window: Recording) -> float:
     # A torque acts from one frame to the next, so it works against the mean of their speeds.
     mean_vel = (window.joint_vel[:-1] + window.joint_vel[1:]) / 2
     work = np.maximum(window.torque[:-1] * mean_vel, 0).sum() * window.time_step
-    way = window.trunk_pos[-1, 0] - window.trunk_pos[0, 0]
+    way = distance(window)
     return float(work / (size.mass * size.gravity * way)) if way > 0 else np.nan
 
 

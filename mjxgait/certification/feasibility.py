@@ -22,7 +22,7 @@ CROUCHES = (0.0, 0.1)
 """Hip heights by which the trunk may be lower than standing."""
 SIDEWAYS = 0.05
 """Weight of a foot's way to the side: legs that swing about an upright axis move it in an arc."""
-MOST, HALVINGS = 1.0, 5
+GREATEST_REACH, HALVINGS = 1.0, 5
 """Greatest hip heights at which a foot's reach is tried, and steps of the search below."""
 SPENT = 0.9
 """Share of the torque limit that a step may take; balance and swings need the rest.
@@ -208,7 +208,7 @@ def _reached_at(leg: Leg, creature: Creature, direction: Sequence[float], crouch
         pose[leg.joints] = leg.reach(path, creature.joints.stand, crouch)
         return leg.missed(path, pose, crouch) <= REACHED
 
-    low, high = 0.0, MOST
+    low, high = 0.0, GREATEST_REACH
     if reaches(high):
         return high
     for _ in range(HALVINGS):

@@ -122,8 +122,8 @@ class Statics:
     def _touch(self) -> None:
         """Find the contacts of the standing pose."""
         feet, data, floor = self.creature.feet, self.data, self.model.geom(FLOOR).id
-        foot_of = dict(zip(feet.stepping, feet.geoms, strict=True))
-        foot_of |= dict.fromkeys(feet.others, -1)
+        foot_of = dict(zip(feet.stepping, feet.foot_of_geoms, strict=True))
+        foot_of |= dict.fromkeys(feet.ground_ids, -1)
         found: list[tuple[np.ndarray, int, int]] = []
         for place, pair in zip(data.contact.pos, data.contact.geom, strict=True):
             geom = int(pair.sum()) - floor

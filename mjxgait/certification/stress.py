@@ -1,7 +1,7 @@
 """A harder test than the certificate: bumps, slopes, slippery floors, pushes, ten minutes' walk.
-Each function returns the creature with another model. Its parts, their masses and all indices stay
-the same, so `simulate` accepts it with every champion of the creature. Uneven ground is set by the
-creature's `terrain`: `creature.on("rough:0.05")`.
+
+Each trial simulates the same champion under one disturbance. Uneven ground is the creature's
+terrain (`creature.on("rough:0.05")`); the others change the initial conditions or the model.
 
 Letters: `S` simulations.
 """
@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.trials import Draw, common, simulate
+from mjxgait.certification.trials import Draw, common_draw, simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -127,7 +127,7 @@ def stress(
             "examines it"
         )
     config, found = config or StressConfig(), []
-    draw = draw or common(CertificateConfig())
+    draw = draw or common_draw(CertificateConfig())
     for name, tried in _trials(creature, champion, config, draw):
         tell(name)
         done = [_done(creature, outcome) for outcome in tried()]

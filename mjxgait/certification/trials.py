@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mjxgait.certification.acceptance import acceptance_of, how_simulated
+from mjxgait.certification.acceptance import acceptance_of, task_rules
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
 from mjxgait.certification.verdict import verdict_on
@@ -22,7 +22,7 @@ from mjxgait.processes import cores
 from mjxgait.reference.controllers import ReferenceController
 from mjxgait.reference.outcome import Fall, Outcome, Watch
 from mjxgait.reference.starts import Starts, join, perturbed_starts, pushed_starts, unfamiliar
-from mjxgait.reference.stepping import Stepping
+from mjxgait.reference.stepping import ReferenceSimulation
 
 AIMS = 3
 """Purpose of the draw of a task's goals."""
@@ -44,12 +44,12 @@ class Draw:
         return np.random.default_rng([*self.words, purpose])
 
 
-def common(config: CertificateConfig) -> Draw:
+def common_draw(config: CertificateConfig) -> Draw:
     """Return the draw shared by all champions."""
     return Draw((config.seed,))
 
 
-def own(champion: Champion, config: CertificateConfig) -> Draw:
+def own_draw(champion: Champion, config: CertificateConfig) -> Draw:
     """Return the champion's own draw."""
     return Draw((config.seed, int(champion.fingerprint, 16)))
 
@@ -105,6 +105,7 @@ def simulate(
     threads: int = 0,
     watch: Watch | None = None,
     reference: ReferenceController | None = None,
+    config: CertificateConfig | None = None,
 ) -> Outcome:
     """Simulate the champion from every start; a start without a goal gets the task's nominal one.
 
@@ -118,18 +119,24 @@ def simulate(
       watch: receives the simulations that can no longer succeed, and ends all once that decides
         the result.
       reference: replaces the champion's own reference controller.
+      config: thresholds by which a start has a goal, and `watch` a result; the default ones.
     """
+    config = config or CertificateConfig()
     steps = round(seconds / creature.model.opt.timestep)
-    task = how_simulated(champion.task, champion.wish)
-    fall = fall or task.fall(CertificateConfig())
-    starts = task.aimed(starts, CertificateConfig())
+    task = task_rules(champion.task, champion.wish)
+    fall = fall or task.fall(config)
+    starts = task.aimed(starts, config)
     if heading is None:
         heading = task.commanded_heading(steps, creature.model.opt.timestep)
     commanded = None if heading is None else np.broadcast_to(heading, (len(starts), steps))
-    stepping = Stepping(
+    stepping = ReferenceSimulation(
         creature, champion, starts, record, fall, task, reference, threads=threads or cores()
     )
-    return stepping.to_the_end(steps, commanded, None if watch is None else watch.tell)
+
+    def decided(seen: Outcome, steps: int) -> bool:
+        return watch is not None and watch.tell(task.lost(seen, starts, steps, config))
+
+    return stepping.to_the_end(steps, commanded, None if watch is None else decided)
 
 
 def steering_criteria(
@@ -180,7 +187,7 @@ def trial_run(
         a share has been lucky more often than not.
     """
     config = config or CertificateConfig()
-    draw, acceptance = common(config), acceptance_of(champion.task, champion.wish)
+    draw, acceptance = common_draw(config), acceptance_of(champion.task, champion.wish)
     disturbed = acceptance.aimed(
         starts(creature, config, draw, count), config, draw.generator(AIMS)
     )
@@ -197,7 +204,7 @@ def trial_run(
 
     watch = Watch(len(begun), lambda lost: margin(~lost) < wanted)
     fall = acceptance.fall(config)
-    outcome = simulate(creature, champion, begun, seconds, fall=fall, watch=watch)
+    outcome = simulate(creature, champion, begun, seconds, fall=fall, watch=watch, config=config)
     if watch.over:
         return margin(~watch.lost)
     succeeded = acceptance.succeeded(outcome, begun, config)

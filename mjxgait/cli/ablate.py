@@ -6,7 +6,7 @@ from pathlib import Path
 
 import tyro
 
-from mjxgait.api.studies import AblateRequest, finished, prepared
+from mjxgait.api.studies import AblateRequest, evolve_study, prepared
 from mjxgait.cli.options import Verbosity, parsed, request_of
 from mjxgait.errors import INTERRUPTED
 from mjxgait.output import Output
@@ -36,4 +36,4 @@ def ablate_command(arguments: Sequence[str]) -> int:
         output.console.print(planned.words)
         return 0
     output.say(planned.words)
-    return INTERRUPTED if finished(planned, request, output) is None else 0
+    return INTERRUPTED if evolve_study(planned, request, output) is None else 0

@@ -33,7 +33,7 @@ class GalleryOptions(Verbosity):
       task: Evolve champions of this task first.
       runs: With --task, number of runs.
       seed: With --task, seed of the first run.
-      env: With --task, creature; by default blocks where only bodies that grow have this task.
+      env: With --task, creature; by default blocks for every task that bodies that grow have.
       generations: With --task, most generations of each run.
       population: With --task, individuals of a generation.
       study: With --task, folder for the runs; by default runs/gallery-TASK.
@@ -108,7 +108,7 @@ def _evolve(options: GalleryOptions, study: Path) -> int:
     given = {
         "env": options.env or _usual_creature(options.task or ""),
         "use.task": options.task,
-        "runs": options.runs or RUNS,
+        "runs": RUNS if options.runs is None else options.runs,
         "out": study,
         "seed": options.seed,
         "generations": options.generations,
@@ -137,7 +137,8 @@ def _check_same(options: GalleryOptions, study: Path) -> None:
     }
     for name, value in has.items():
         asked = getattr(options, name)
-        if asked is not None and asked != value:
+        same = asked is None or (title_of(asked) if name == "task" else asked) == value
+        if not same:
             raise UserError(
                 f"{study}: holds runs with --{name} {value}; leave --{name} {asked} out to keep "
                 "them, or name another folder with --study"

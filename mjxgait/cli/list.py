@@ -7,7 +7,7 @@ from mjxgait.cli.options import parsed
 from mjxgait.config.layers import data_folder, find_creature, shipped_configs, shipped_creatures
 from mjxgait.config.tables import read_toml
 from mjxgait.creature import load_creature
-from mjxgait.creature.ground.spec import DIRECTIONS, FLAT, MOST
+from mjxgait.creature.ground.spec import DIRECTIONS, FLAT, MAX_SIZE
 from mjxgait.kinds import controllers, tasks
 from mjxgait.tasks.walk.gaits import AUTO, GAITS
 from mjxgait.tasks.walk.targets import NATURAL
@@ -69,7 +69,7 @@ def _described(creature: str) -> str:
 
 def _ground(kind: str) -> str:
     ways = "".join(f", :{way}" for way in DIRECTIONS[kind][1:])
-    return f"{kind}:NUMBER{ways}; {GROUNDS[kind]}, at most {MOST[kind]:g}"
+    return f"{kind}:NUMBER{ways}; {GROUNDS[kind]}, at most {MAX_SIZE[kind]:g}"
 
 
 def _comment(text: str) -> str:

@@ -18,6 +18,8 @@ from mjxgait.errors import (
 )
 
 OWN_PARTS = ("--controller", "--task")
+TAKES = {"train": ("controller", "task"), "certify": ("task",), "gallery": ("task",)}
+"""Shipped kinds that a command takes; user-defined ones are loaded for every command."""
 """Options of every subcommand that name user-defined code."""
 
 USAGE = """usage: mjxgait SUBCOMMAND [options]
@@ -45,6 +47,11 @@ def _with_own_parts(given: Sequence[str]) -> list[str]:
     from mjxgait.plugins.user_code import take_own
 
     rest, named = take_own(rest)
+    from mjxgait.kinds import shipped
+
+    for kind, name in named.items():
+        if name in shipped(kind) and kind not in TAKES.get(command, ()):
+            raise UserError(f"--{kind} {name}: mjxgait {command} has no use for it; leave it out")
     if command == "train":
         rest += [word for kind, name in named.items() for word in (f"--use.{kind}", name)]
     if command in ("certify", "gallery") and "task" in named:
@@ -139,6 +146,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # about the rest.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        # Such as a name that is too long, or a folder that may not be read.
+        print(f"mjxgait: {error.filename}: {error.strerror}", file=sys.stderr)
+        sys.exit(2)
     except KeyboardInterrupt:
         print("mjxgait: interrupted", file=sys.stderr)
         sys.exit(INTERRUPTED)

@@ -9,6 +9,7 @@ from typing import Literal
 import tyro
 
 from mjxgait.cli.options import parsed
+from mjxgait.errors import UserError
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,6 +36,8 @@ class PlotOptions:
 def plot_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     options = parsed(PlotOptions, "plot", arguments)
+    if not options.formats:
+        raise UserError("--formats: give png, svg or both")
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     if options.family_tree is not None:
         from mjxgait.rendering.family import draw_family_tree

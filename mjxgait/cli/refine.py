@@ -11,12 +11,13 @@ import tyro
 
 from mjxgait.api import Run, load_creature
 from mjxgait.api.make import evolve
+from mjxgait.api.requests import check_resumed
 from mjxgait.cli.options import Verbosity, parsed
 from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import read_toml
 from mjxgait.creature import Creature
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.training.folder import check_parts, check_run, new_run_folder, open_run
+from mjxgait.training.folder import check_parts, check_run, command, new_run_folder, open_run
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,8 +72,12 @@ def refine_command(arguments: Sequence[str]) -> int:
     from mjxgait.animation.keys.refine import base_settings, begin, refining
 
     if options.resume:
+        kept = "a resumed cycle keeps its settings"
+        check_resumed(options, options.resume, ("quiet", "verbose"), kept)
         runs = refine.runs_in(options.resume)
         return _front(options.resume, runs, quiet) if runs else _resumed(options.resume, quiet)
+    if not options.keep:
+        raise UserError("--keep: give at least one share")
     if options.keys is None:
         raise UserError("name the file with the cycle: mjxgait refine --env duck --keys walk.glb")
     creature = load_creature(options.env)
@@ -120,7 +125,7 @@ def _front(out: Path, runs: Sequence[Path], quiet: bool) -> int:
     for run in runs:
         print(f"{run}:")
         if not refine.finished(run) and _resumed(run, quiet) == INTERRUPTED:
-            print(f"To go on: mjxgait refine --resume {out}")
+            print(f"To go on: {command('refine', '--resume', out, run=run)}")
             return INTERRUPTED
     print(f"Side by side: {refine.draw(out)}")
     return 0

@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 
-from mjxgait.api.repertoires import RepertoireRequest, gather
+from mjxgait.api.repertoires import RepertoireRequest, evolve_repertoire
 from mjxgait.cli.options import Verbosity, parsed, request_of
 from mjxgait.errors import INTERRUPTED
 from mjxgait.output import Output
@@ -21,5 +21,7 @@ class RepertoireOptions(Verbosity, RepertoireRequest):
 def repertoire_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     options = parsed(RepertoireOptions, "repertoire", arguments)
-    _, ended = gather(request_of(RepertoireRequest, options), Output(quiet=options.quiet))
+    _, ended = evolve_repertoire(
+        request_of(RepertoireRequest, options), Output(quiet=options.quiet)
+    )
     return 0 if ended else INTERRUPTED

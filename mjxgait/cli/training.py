@@ -101,6 +101,8 @@ def train(arguments: Sequence[str]) -> int:
 
 def _check_resumed(options: TrainOptions, config: Config, default: Config) -> None:
     """Reject changes that a resumed run cannot make. default: the settings of its folder."""
+    if options.out is not None:
+        raise UserError(f"{options.resume}: a resumed run keeps its folder; leave --out out")
     if options.scale or options.way != "forward":
         raise UserError(
             f"{options.resume}: a resumed run keeps its body; --scale and --way need a new run"
@@ -176,7 +178,7 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
         begin = partial(create_multi_seed, parent, creature, config, options.runs, together)
         ended = evolve_seeds(parent, output, options.cluster, begin)
         return 0 if ended else INTERRUPTED
-    other = options.scale or options.way != "forward"
+    other = options.scale or options.way != "forward" or options.out is not None
     if options.runs is not None or other or config != default:
         raise UserError(
             f"{options.resume}: resumed runs keep their number, body and settings; only --cluster "

@@ -87,7 +87,7 @@ def resolve_config(
     given: list[Layer] = []
     own = f"{creature_name}/creature.toml: [train]"
     general = over_base(creature_table, own)
-    of_tasks = general.pop("task", {})
+    of_tasks = _task_tables(general, own)
     if not mine.standalone:
         given.append((str(default), read_toml(default)))
         given.append((own, general))
@@ -113,6 +113,18 @@ def resolve_config(
     config = build(cls, table, "the settings taken together")
     _check_other_tasks(mine, config, config_class, meant)
     return config
+
+
+def _task_tables(layer: dict[str, Any], where: str) -> Table:
+    """Take the tables by task out of a layer.
+
+    Raises:
+      UserError: its key `task` is no table.
+    """
+    tasks = layer.pop("task", {})
+    if not isinstance(tasks, Mapping):
+        raise UserError(f"{where}: task = {tasks!r}: give tables such as [task.follow]")
+    return tasks
 
 
 def over_base(table: Table, where: str) -> dict[str, Any]:
@@ -250,16 +262,14 @@ def _file_layers(file: Path, creature_name: str) -> _FileLayers:
 
     The tables of other creatures are checked too, so that a mistake shows in every run.
     """
-    path = _find_config(file)
+    path = find_file(file, data_folder("configs"), "config")
     general = over_base(read_toml(path), str(path))
     standalone, creatures = general.pop("standalone", False), general.pop("creature", {})
-    tasks = general.pop("task", {})
+    tasks = _task_tables(general, str(path))
     if not isinstance(standalone, bool):
         raise UserError(f"{path}: standalone = {standalone!r}: give true or false")
     if not isinstance(creatures, Mapping):
         raise UserError(f"{path}: creature = {creatures!r}: give tables such as [creature.crab]")
-    if not isinstance(tasks, Mapping):
-        raise UserError(f"{path}: task = {tasks!r}: give tables such as [task.follow]")
     known = {creature_name, *shipped_creatures()}
     for name, own in creatures.items():
         if name not in known:
@@ -276,13 +286,21 @@ def _file_layers(file: Path, creature_name: str) -> _FileLayers:
     return _FileLayers(standalone, ((str(path), general),), (mine,), tasks, f"{path}: [task")
 
 
-def _find_config(file: Path) -> Path:
-    shipped = data_folder("configs") / f"{file}.toml"
-    if not file.exists() and shipped.exists():
+def find_file(file: Path, folder: Path, kind: str) -> Path:
+    """Return a file of settings, or the shipped one of that name in a folder.
+
+    kind: what the shipped files are called in the error.
+
+    Raises:
+      UserError: there is neither.
+    """
+    shipped = folder / f"{file}.toml"
+    # A folder of that name does not hide the shipped file.
+    if file.is_file() or (file.exists() and not shipped.exists()):
+        return file
+    if shipped.exists():
         return shipped
-    if not file.exists():
-        raise UserError(
-            f"{file}: no such file and no shipped config of that name; "
-            f"{did_you_mean(str(file), shipped_configs())}"
-        )
-    return file
+    known = sorted(path.stem for path in folder.glob("*.toml"))
+    raise UserError(
+        f"{file}: no such file and no shipped {kind} of that name; {did_you_mean(str(file), known)}"
+    )

@@ -79,12 +79,16 @@ class NoSettings:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the table in a TOML file; UserError names the file and the faulty line."""
-    text = read_text(path, MOST_TOML)
+    return parse_toml(read_text(path, MOST_TOML), str(path))
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """Return the table in a text; UserError names `where` it is from and the faulty line."""
     try:
         table = tomllib.loads(text)
         check_tree(table)
     except (ValueError, RecursionError) as error:
-        raise UserError(f"{path}: not valid TOML ({error})") from None
+        raise UserError(f"{where}: not valid TOML ({error})") from None
     return table
 
 
@@ -109,6 +113,17 @@ def not_none(**values: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
+def as_table(value: object, where: str) -> Table:
+    """Return a value that must be a table.
+
+    Raises:
+      UserError: it is none.
+    """
+    if not isinstance(value, Mapping):
+        raise UserError(f"{where} = {reprlib.repr(value)}: give a table")
+    return value
+
+
 def build(cls: type[T], table: Table, where: str) -> T:
     """Build `cls` (a dataclass, nested ones included) from a table.
 
@@ -119,8 +134,9 @@ def build(cls: type[T], table: Table, where: str) -> T:
       UserError: names the first key that is unknown, missing, of a wrong type or out of range, and
         the allowed values.
     """
+    given = as_table(table, where)
     try:
-        return _adapter(cls).validate_python(dict(table))  # type: ignore[arg-type]
+        return _adapter(cls).validate_python(dict(given))  # type: ignore[arg-type]
     except pydantic.ValidationError as error:
         problems = error.errors(include_url=False)
         # A misspelt key is also a missing one: report the misspelling, which the user can correct.

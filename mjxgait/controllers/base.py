@@ -21,6 +21,7 @@ from mjxgait.evolution.variation import (
     jittered,
     narrowed,
     real_variation,
+    uniform_crossover,
 )
 from mjxgait.types import pytree
 
@@ -67,7 +68,7 @@ class Controller(Protocol[Settings_contra, Genome, Plan, Memory]):
         """Return genomes [N, ...] as rows [N, genes], in gene ranges, to measure diversity."""
         ...
 
-    def numbers(self, genomes: Genome) -> Mapping[str, np.ndarray]:
+    def genome_statistics(self, genomes: Genome) -> Mapping[str, np.ndarray]:
         """Return statistics [N] of genomes [N, ...] by name, to follow over the generations."""
         ...
 
@@ -144,7 +145,7 @@ class RealController(abc.ABC):
         """See `Controller`."""
         return in_ranges(genomes, self._box(settings))
 
-    def numbers(self, genomes: Genes) -> Mapping[str, np.ndarray]:
+    def genome_statistics(self, genomes: Genes) -> Mapping[str, np.ndarray]:
         """Report no quantities."""
         return {}
 
@@ -210,8 +211,7 @@ class BodiedController:
 
         def cross(key: jax.Array, mother: Bodied, father: Bodied) -> Bodied:
             key_plan, key_sizes = jax.random.split(key)
-            from_mother = jax.random.bernoulli(key_sizes, 0.5, mother.sizes.shape)
-            sizes = jnp.where(from_mother, mother.sizes, father.sizes)
+            sizes = uniform_crossover(key_sizes, mother.sizes, father.sizes)
             return Bodied(own.cross(key_plan, mother.plan, father.plan), sizes)
 
         def mutate(key: jax.Array, genome: Bodied) -> Bodied:
@@ -240,9 +240,9 @@ class BodiedController:
         plan = self.controller.genes(genomes.plan, settings)
         return np.concatenate([plan, in_ranges(genomes.sizes, self.box)], axis=1)
 
-    def numbers(self, genomes: Bodied) -> Mapping[str, np.ndarray]:
+    def genome_statistics(self, genomes: Bodied) -> Mapping[str, np.ndarray]:
         """See `Controller`."""
-        return self.controller.numbers(genomes.plan)
+        return self.controller.genome_statistics(genomes.plan)
 
     def prepare(self, genome: Bodied, settings: object) -> object:
         """See `Controller`."""

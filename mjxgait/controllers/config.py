@@ -9,7 +9,7 @@ HOLDS = (1, 2, 4, 8, 16)
 """Allowed control steps per command."""
 
 
-def holds(steps: int) -> int:
+def check_every(steps: int) -> int:
     """Return `steps`, the control steps per command, if allowed.
 
     Raises:

@@ -52,12 +52,12 @@ def foot_places(creature: Body, sensed: Sensed) -> jax.Array:
     return (middles - sensed.trunk_pos) @ axes
 
 
-def _attitude(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
+def _attitude(sensed: Sensed, axis: np.ndarray) -> jax.Array:
     """Return the sine of the angle of a trunk axis above the horizon."""
     return jnp.clip((sensed.trunk_rot @ axis.astype(np.float32))[2], -1.0, 1.0)
 
 
-def _rate(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
+def _rate(sensed: Sensed, axis: np.ndarray) -> jax.Array:
     """Return the trunk's angular velocity about one of its own axes."""
     return sensed.trunk_angvel @ (sensed.trunk_rot @ axis.astype(np.float32))
 
@@ -83,14 +83,10 @@ SENSES: Mapping[str, Sense] = {
     ),
     "foot_place": lambda creature, sensed, time: foot_places(creature, sensed),
     "up_vel": lambda creature, sensed, time: sensed.trunk_vel[2],
-    "pitch": lambda creature, sensed, time: (
-        -jnp.arcsin(_attitude(creature, sensed, creature.frame.forward))
-    ),
-    "roll": lambda creature, sensed, time: jnp.arcsin(
-        _attitude(creature, sensed, creature.frame.left)
-    ),
-    "pitch_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.left),
-    "roll_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.forward),
+    "pitch": lambda creature, sensed, time: -jnp.arcsin(_attitude(sensed, creature.frame.forward)),
+    "roll": lambda creature, sensed, time: jnp.arcsin(_attitude(sensed, creature.frame.left)),
+    "pitch_rate": lambda creature, sensed, time: _rate(sensed, creature.frame.left),
+    "roll_rate": lambda creature, sensed, time: _rate(sensed, creature.frame.forward),
 }
 """Observations by name; shapes and units are in docs/reference/controller.md."""
 

@@ -62,7 +62,10 @@ class Rules:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Drive:
-    """Joint motors of one creature. step: s between two commands."""
+    """Joint motors of one creature.
+
+    step: s, time step of the simulation; a command may be held for several.
+    """
 
     creature: Body
     step: float

@@ -142,35 +142,41 @@ class Corrections:
 class Feet:
     """Feet, and other geoms that may touch the ground.
 
-    names: one per foot. foot_of: [F] foot of each geom of a foot. watched: [G] ids of geoms with an
-    observed height. ground: ids of the other geoms that may touch the floor. stations: each foot's
+    names: [N] of the feet. foot_of_geoms: [F] foot of each geom of a foot. watched_ids: [G] ids of
+    the geoms with an observed height, those of the feet first. ground_ids: of the other geoms that
+    may touch the floor. The same as arrays: `foot_of`, `watched`, `ground`. stations: each foot's
     rank from the front on its side, and whether that side is the left. places: [N, 2] m ahead of
-    the trunk and left of it along its nose, where the N feet stand.
+    the trunk and left of it along its nose, where the feet stand.
     """
 
     names: tuple[str, ...] = _static()
-    geoms: tuple[int, ...] = _static()
-    seen: tuple[int, ...] = _static()
-    others: tuple[int, ...] = _static()
+    foot_of_geoms: tuple[int, ...] = _static()
+    watched_ids: tuple[int, ...] = _static()
+    ground_ids: tuple[int, ...] = _static()
     stations: tuple[tuple[int, bool], ...] = dataclasses.field(default=(), metadata=STATIC)
     places: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 2)))
 
     @property
     def stepping(self) -> tuple[int, ...]:
         """Ids [F] of the feet's geoms."""
-        return self.seen[: len(self.geoms)]
+        return self.watched_ids[: len(self.foot_of_geoms)]
+
+    def geoms_of(self, foot: int) -> list[int]:
+        """Return the ids of one foot's geoms."""
+        pairs = zip(self.stepping, self.foot_of_geoms, strict=True)
+        return [geom for geom, own in pairs if own == foot]
 
     @functools.cached_property
     def foot_of(self) -> np.ndarray:
         """Foot [F] of each geom of a foot."""
-        return np.array(self.geoms, dtype=int)
+        return np.array(self.foot_of_geoms, dtype=int)
 
     @functools.cached_property
     def watched(self) -> np.ndarray:
         """Ids [G] of the geoms with an observed height."""
-        return np.array(self.seen, dtype=int)
+        return np.array(self.watched_ids, dtype=int)
 
     @functools.cached_property
     def ground(self) -> np.ndarray:
         """Ids of the other geoms that may touch the floor."""
-        return np.array(self.others, dtype=int)
+        return np.array(self.ground_ids, dtype=int)

@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 
 GEOM = mujoco.mjtGeom
-MOST = 5
+MAX_BARS = 5
 """Largest number of bars side by side in a flat shape."""
 STATIONS = 65
-REST = 0.1
+UNCOVERED = 0.1
 """Share of a shape's length above which an uncovered end gets a bar of its own."""
 RINGS = 24
 SHARP = 0.25
@@ -98,7 +98,7 @@ def _fill(points: np.ndarray) -> list[Bar]:
     except (QhullError, ValueError):  # a sheet or a needle
         return []
     reach = size[broad] - size[thin]
-    count = min(1 + int(np.ceil(reach / max(0.6 * size[thin], 1e-9))), MOST)
+    count = min(1 + int(np.ceil(reach / max(0.6 * size[thin], 1e-9))), MAX_BARS)
     offsets = np.linspace(-reach, reach, count) if count > 1 else np.zeros(1)
     bars = []
     for offset in offsets:
@@ -134,7 +134,7 @@ def _along(line: np.ndarray, inside: np.ndarray) -> list[Bar]:
     covered = np.linalg.norm(line - bar.centre, axis=1) <= np.linalg.norm(bar.half) + bar.radius
     first, last = np.flatnonzero(covered)[[0, -1]]
     ends = [slice(0, first), slice(last + 1, len(line))]
-    worth = [e for e in ends if len(line[e]) > REST * len(line) and inside[e].max() > 0]
+    worth = [e for e in ends if len(line[e]) > UNCOVERED * len(line) and inside[e].max() > 0]
     return [bar, *(_largest(line[e], inside[e]) for e in worth)]
 
 

@@ -69,7 +69,7 @@ def given_body(creature: Creature) -> GivenBody:
         mirror=creature.mirror,
         corrections=creature.corrections,
         feet=dataclasses.replace(
-            creature.feet, names=_numbered(creature.feet.names), seen=(), others=()
+            creature.feet, names=_numbered(creature.feet.names), watched_ids=(), ground_ids=()
         ),
         nv=creature.nv,
     )

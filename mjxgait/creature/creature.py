@@ -147,7 +147,7 @@ class Creature:
         if not touch_ends:
             return self.model
         model = mujoco.MjModel.from_xml_string(self.files["creature.xml"])
-        allowed = {*self.feet.stepping, *self.feet.others, model.geom(FLOOR).id}
+        allowed = {*self.feet.stepping, *self.feet.ground_ids, model.geom(FLOOR).id}
         silent = [g for g in range(model.ngeom) if g not in allowed]
         model.geom_contype[silent] = 0
         model.geom_conaffinity[silent] = 0

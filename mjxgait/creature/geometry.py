@@ -229,7 +229,7 @@ def off_axis(vectors: np.ndarray, axes: np.ndarray) -> np.ndarray:
     return length
 
 
-WAY_OUT = "evolution knows one creature on a flat floor and nothing else"
+WAY_OUT = "only one creature on a flat floor is simulated"
 
 
 def beside(model: mujoco.MjModel, names: Collection[str]) -> np.ndarray:

@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjxgait.config.tables import build, read_toml
+from mjxgait.config.tables import build, parse_toml
 from mjxgait.creature import geometry
 from mjxgait.creature.anatomy import (
     Corrections,
@@ -36,6 +36,7 @@ NOT_ALONE = re.compile(
     r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|"
     r"flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
 )
+MODEL, SETTINGS = "creature.xml", "creature.toml"
 HEAVIEST = 1e6
 """Limit of a body's mass in kg and of its moments of inertia in kg·m²."""
 MOST_TEXT = 8_000_000
@@ -48,13 +49,24 @@ def load_creature(folder: Path) -> Creature:
     Raises:
       UserError: names the file, the wrong element and the remedy.
     """
-    toml, xml = folder / "creature.toml", folder / "creature.xml"
-    settings = build(CreatureSettings, read_toml(toml), str(toml))
+    paths = [folder / SETTINGS, folder / MODEL]
+    paths += [path for path in [folder / ORIGIN] if path.is_file()]
+    files = {path.name: read_text(path, MOST_TEXT) for path in paths}
+    return creature_of(files, folder)
+
+
+def creature_of(files: Mapping[str, str], folder: Path | None = None) -> Creature:
+    """Return the creature of these files, by name. folder: that they are from.
+
+    Raises:
+      UserError: names the file, the wrong element and the remedy.
+    """
+    files = {name: files[name] for name in (SETTINGS, MODEL, ORIGIN) if name in files}
+    toml, xml = (str(folder / name if folder else name) for name in (SETTINGS, MODEL))
+    settings = build(CreatureSettings, parse_toml(files[SETTINGS], toml), toml)
+    _check_alone(xml, files[MODEL])
     try:
-        texts = [toml, xml] + [path for path in [folder / ORIGIN] if path.is_file()]
-        files = {path.name: read_text(path, MOST_TEXT) for path in texts}
-        _check_alone(xml, files["creature.xml"])
-        model = mujoco.MjModel.from_xml_string(files["creature.xml"])
+        model = mujoco.MjModel.from_xml_string(files[MODEL])
     except (ValueError, mujoco.FatalError) as error:
         raise UserError(
             f"{xml}: not a model that MuJoCo can load ({' '.join(str(error).split())})"
@@ -62,10 +74,10 @@ def load_creature(folder: Path) -> Creature:
     try:
         return _assemble(settings, files, model)
     except UserError as error:
-        raise UserError(f"{folder}: {error}") from None
+        raise UserError(f"{folder or settings.creature.name}: {error}") from None
 
 
-def _check_alone(path: Path, text: str) -> None:
+def _check_alone(path: str, text: str) -> None:
     """Refuse other files, plugins and replication, because a body may come from a stranger."""
     if found := NOT_ALONE.search(text):
         what = found.group(1) or found.group(2)
@@ -79,6 +91,11 @@ def _assemble(
     settings: CreatureSettings, files: Mapping[str, str], model: mujoco.MjModel
 ) -> Creature:
     trunk = _id(model, mujoco.mjtObj.mjOBJ_BODY, settings.creature.trunk, "creature.trunk")
+    if not model.body_jntnum[trunk]:
+        raise UserError(
+            f'creature.trunk = "{settings.creature.trunk}": has no joint, so it cannot move; give '
+            "it a free joint, or name the body that has one"
+        )
     for key, parts in (("rig.bones", settings.rig.bones), ("rig.turned", settings.rig.turned)):
         for part in parts:
             _id(model, mujoco.mjtObj.mjOBJ_BODY, part, key)
@@ -277,9 +294,9 @@ def _feet(
     places = [(data.geom_xpos[geoms].mean(0) - data.xpos[trunk]) @ level for geoms in own]
     return Feet(
         names=tuple(model.body(b).name for b in bodies),
-        geoms=tuple(foot_of),
-        seen=(*stepping, *_forbidden(model, stepping, ground)),
-        others=tuple(ground),
+        foot_of_geoms=tuple(foot_of),
+        watched_ids=(*stepping, *_forbidden(model, stepping, ground)),
+        ground_ids=tuple(ground),
         stations=stations_of([(float(ahead), float(left)) for ahead, left in places]),
         places=np.array(places),
     )
@@ -293,6 +310,9 @@ def _foot_bodies(model: mujoco.MjModel, settings: CreatureSettings) -> tuple[lis
     if twice := [name for name in names if names.count(name) > 1]:
         raise UserError(f'creature.feet names "{twice[0]}" twice; leave one out')
     geoms = [_id(model, mujoco.mjtObj.mjOBJ_GEOM, name, "creature.feet") for name in names]
+    for geom, name in zip(geoms, names, strict=True):
+        if model.geom_bodyid[geom] == 0:
+            raise UserError(f'creature.feet names "{name}", which belongs to no body; leave it out')
     body_of = {g: _foot_body(model, settings, g) for g in geoms}
     bodies = list(dict.fromkeys(body_of.values()))
     return bodies, sorted(geoms, key=lambda g: bodies.index(body_of[g]))
@@ -347,7 +367,12 @@ def _check(creature: Creature, data: mujoco.MjData) -> None:
     model, h = creature.model, creature.model.opt.timestep
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
-    inertia = 1 / np.diag(np.linalg.inv(mass))[creature.joints.dof_adr]
+    try:
+        inertia = 1 / np.diag(np.linalg.inv(mass))[creature.joints.dof_adr]
+    except np.linalg.LinAlgError:
+        raise UserError(
+            "its mass matrix is singular: two joints of one body turn alike; take one out"
+        ) from None
     for j, name in enumerate(creature.joints.names):
         if creature.joints.pose_low[j] > creature.joints.pose_high[j]:
             raise UserError(

@@ -11,7 +11,8 @@ import numpy as np
 
 from mjxgait.creature.creature import Creature, vertical_freedom
 from mjxgait.creature.geometry import DOWN, geom_reach, posed, shapes
-from mjxgait.creature.scale import load_files, scaled_files
+from mjxgait.creature.load import creature_of
+from mjxgait.creature.scale import scaled_files
 from mjxgait.errors import UserError
 
 SLIDE = mujoco.mjtJoint.mjJNT_SLIDE
@@ -70,7 +71,7 @@ def grown(creature: Creature, sizes: Mapping[str, float]) -> Creature:
         return creature
     # Steering is in body lengths, those of the creature that evolved.
     files = scaled_files(creature.files, sizes, body_length=creature.frame.body_length)
-    return dataclasses.replace(load_files(files), terrain=creature.terrain)
+    return dataclasses.replace(creature_of(files), terrain=creature.terrain)
 
 
 def extreme_bodies(creature: Creature, most: float) -> list[Creature]:

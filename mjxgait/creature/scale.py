@@ -5,10 +5,8 @@ A walk backwards is evolved and examined as a walk forward of the body turned ar
 
 import dataclasses
 import re
-import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Literal, get_args
 
 import mujoco
@@ -18,11 +16,10 @@ import tomli_w
 from mjxgait.config.tables import dump_toml, merge
 from mjxgait.creature.creature import Creature, vertical_freedom
 from mjxgait.creature.geometry import lowest
-from mjxgait.creature.load import load_creature
+from mjxgait.creature.load import MODEL, SETTINGS, creature_of
 from mjxgait.creature.settings import Balance, CreatureSettings, Steering, Stepping, Usual
 from mjxgait.errors import UserError, did_you_mean, matching
 
-MODEL, SETTINGS = "creature.xml", "creature.toml"
 SMALLEST, LARGEST = 0.2, 5.0
 SIZE = re.compile(r"\n *<size\b[^>]*/>")
 """MuJoCo's memory size, removed because MuJoCo finds it by itself."""
@@ -54,7 +51,7 @@ def parse_scales(texts: Sequence[str]) -> dict[str, float]:
 
 def scaled(creature: Creature, scales: Mapping[str, float]) -> Creature:
     """Return the creature with scaled parts, by pattern of their names; see `scaled_files`."""
-    return load_files(scaled_files(creature.files, scales)) if scales else creature
+    return creature_of(scaled_files(creature.files, scales)) if scales else creature
 
 
 def model_text(spec: mujoco.MjSpec) -> str:
@@ -69,14 +66,6 @@ def model_text(spec: mujoco.MjSpec) -> str:
             largest = np.arange(3) == moments.argmax()
             body.inertia = np.where(largest, 1 - ROUNDING, 1.0) * body.inertia
     return SIZE.sub("", spec.to_xml())
-
-
-def load_files(files: Mapping[str, str]) -> Creature:
-    """Return the creature made of these files, by name."""
-    with tempfile.TemporaryDirectory() as folder:  # the run folder keeps the creature
-        for name, text in files.items():
-            (Path(folder) / name).write_text(text, encoding="utf-8")
-        return load_creature(Path(folder))
 
 
 def scaled_files(
@@ -172,7 +161,7 @@ def at_step(creature: Creature, step: float) -> Creature:
         return creature
     spec = mujoco.MjSpec.from_string(creature.files[MODEL])
     spec.option.timestep = step
-    return load_files({**creature.files, MODEL: model_text(spec)})
+    return creature_of({**creature.files, MODEL: model_text(spec)})
 
 
 Way = Literal["forward", "back", "left", "right"]
@@ -201,7 +190,7 @@ def facing(creature: Creature, way: str) -> Creature:
     ahead = {"back": -creature.frame.forward, "left": creature.frame.left}
     axis = ahead.get(way, -creature.frame.left)
     settings = _turned(creature.settings, way, axis)
-    return load_files({**creature.files, SETTINGS: dump_toml(settings)})
+    return creature_of({**creature.files, SETTINGS: dump_toml(settings)})
 
 
 def _turned(settings: CreatureSettings, way: str, axis: np.ndarray) -> CreatureSettings:

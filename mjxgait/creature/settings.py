@@ -31,6 +31,12 @@ def _file_name(name: str) -> str:
     return name
 
 
+def _two_or_none(beside: tuple[str, ...]) -> tuple[str, ...]:
+    if len(beside) not in (0, 2):
+        raise ValueError("must name the opponent and the cube of a contest, or nothing")
+    return beside
+
+
 @dataclasses.dataclass(frozen=True)
 class Identity:
     """The names of the parts.
@@ -51,7 +57,7 @@ class Identity:
     body_length: Positive | None = None
     grows: bool = False
     planar: bool = False
-    beside: tuple[str, ...] = ()
+    beside: Annotated[tuple[str, ...], pydantic.AfterValidator(_two_or_none)] = ()
 
 
 @dataclasses.dataclass(frozen=True)

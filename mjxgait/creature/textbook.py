@@ -67,7 +67,7 @@ class Leg:
         model, feet = creature.model, creature.feet
         self.creature, self.model = creature, model
         self.data = mujoco.MjData(model)
-        own = [feet.stepping[g] for g in range(len(feet.geoms)) if feet.geoms[g] == foot]
+        own = feet.geoms_of(foot)
         self.body = int(model.geom_bodyid[own[0]])
         others = [int(model.geom_bodyid[g]) for g in feet.stepping if g not in own]
         shared = {b for other in others for b in geometry.ancestors(model, other)}

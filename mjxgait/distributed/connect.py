@@ -174,7 +174,7 @@ def _must_answer(address: str, host: str, port: str) -> None:
     """Fail early if the head does not answer; Ray itself would try for minutes."""
     try:
         socket.create_connection((host, int(port)), PATIENCE).close()
-    except (OSError, OverflowError) as error:
+    except (OSError, OverflowError, UnicodeError) as error:
         raise UserError(
             f"--cluster {address}: no answer from {host}:{port} ({error}); is the head running, "
             "and the port open for this machine?"

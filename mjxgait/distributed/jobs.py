@@ -17,7 +17,7 @@ from typing_extensions import override
 from mjxgait.champion import Champion
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.evolution.state import EvolutionState, stop_reason
 from mjxgait.lru import LruCache
 from mjxgait.plugins import build_config
@@ -83,7 +83,7 @@ class Recipe:
             if not is_loaded(part.kind, f"{part.file}:{part.cls}"):
                 part.load()
         configs = [build_config(table, "the settings that were sent") for table in self.tables]
-        return load_files(self.files), configs
+        return creature_of(self.files), configs
 
 
 def _user_code(configs: Sequence[Config]) -> Iterator[UserCode]:

@@ -144,7 +144,7 @@ class Environment:
         if trial.mass_scale is None:
             return trial
         heavier = self.plant.with_mass_scale(self.plant.parameters, trial.mass_scale)
-        return dataclasses.replace(trial, numbers=heavier)
+        return dataclasses.replace(trial, parameters=heavier)
 
     def _begun(self, trial: Starts) -> tuple[Data, Verdict]:
         """Begin the episodes of all lanes."""

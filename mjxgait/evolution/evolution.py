@@ -13,16 +13,16 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.evolution.offspring import Parents, children, forced
+from mjxgait.evolution.forced import forced_offspring, with_forced_phase
+from mjxgait.evolution.offspring import Parents, children
+from mjxgait.evolution.restart import with_restart
 from mjxgait.evolution.state import (
     NO_PARENT,
     EvolutionState,
     GenerationMetrics,
     Origin,
     Proposal,
-    decided,
     metrics,
-    restarted,
 )
 from mjxgait.evolution.strategy import Normal, SeparableCma
 from mjxgait.evolution.survival import Survival, pooled, together
@@ -164,8 +164,8 @@ class Evolution:
         state = dataclasses.replace(state, key=proposal.key, generation=generation)
         normal = self._learnt(state, proposal, evaluation, seeding)
         state = dataclasses.replace(state, normal=normal)
-        state = decided(self.config, state)
-        state = restarted(self.config.restart, state, complete=~self._seeding(state))
+        state = with_forced_phase(self.config, state)
+        state = with_restart(self.config.restart, state, complete=~self._seeding(state))
         mothers, fathers = self._logged(proposal, kept, seeding)
         return state, metrics(self.config, state, evaluation, was_forced, mothers, fathers)
 
@@ -262,7 +262,7 @@ class Evolution:
         first = (state.generation < 0) & (places < self.config.population)
         initial = choose(first, known, created)
         bred, child_origin, parents = self._children(key_children, state)
-        mutants, forced_origin, of_mutant = forced(
+        mutants, forced_origin, of_mutant = forced_offspring(
             keys_forced[1:], self.config, self.variation, state, created
         )
 

@@ -1,4 +1,4 @@
-"""Offspring of a generation: children of two parents, and those of forced evolution (Wilson).
+"""Children of a generation, of two parents each.
 
 Letters: `P` population, `M` offspring.
 """
@@ -45,28 +45,3 @@ def children(
     origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
     both = mothers, jnp.where(crosses, fathers, NO_PARENT)
     return choose(mutates, mutated, child), origin, both
-
-
-def forced(
-    keys: jax.Array,
-    config: EvolutionConfig,
-    variation: Variation,
-    state: EvolutionState,
-    created: object,
-) -> tuple[object, jax.Array, jax.Array]:
-    """Return immigrants and repeatedly mutated genomes, origins, and the mutants' parents.
-
-    keys: [1 + mutations]. created: genomes [M, ...] of which the immigrants are the first.
-    """
-    count = config.offspring
-    newcomers = jnp.round(config.forced.newcomers * count)
-    drawn = jax.random.randint(keys[0], (count,), 0, config.population)
-    mutants = jax.tree.map(lambda leaf: leaf[drawn], state.genomes)
-
-    def mutated(mutants: object, key: jax.Array) -> tuple[object, None]:
-        return jax.vmap(variation.mutate)(jax.random.split(key, count), mutants), None
-
-    mutants, _ = jax.lax.scan(mutated, mutants, keys[1:])
-    is_new = jnp.arange(count) < newcomers
-    genomes = choose(is_new, created, mutants)
-    return genomes, jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)), drawn

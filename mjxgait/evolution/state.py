@@ -1,13 +1,12 @@
-"""State of evolution from generation to generation, its metrics, and forced evolution."""
+"""State of evolution from generation to generation, and its metrics."""
 
-import dataclasses
 from enum import IntEnum
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
-from mjxgait.config.evolution import EvolutionConfig, RestartConfig
+from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.evolution.strategy import Normal
 from mjxgait.evolution.variation import first_occurrence
 from mjxgait.types import Evaluation, pytree
@@ -34,8 +33,8 @@ class EvolutionState:
     generation of birth. origin: [P] an `Origin`.
     key: for all future random numbers. generation: [] -1 while seeding. seeded: [] number of the
     initial population evaluated so far.
-    best_history, mean_history: [W] of the latest generations, newest last. quiet: [] generations
-    since the last forced phase.
+    best_history, mean_history: [W = window + 1] of the latest generations, newest last. quiet: []
+    generations since the last forced phase.
     forced: [] whether the next generation is forced. spell_age, refreshed: [] of the current phase.
     spell_best: [] best fitness when the last phase began. barren: [] phases in a row that began
     without a better best than the one before.
@@ -80,9 +79,10 @@ class GenerationMetrics:
     genome: mean over an array's genes, then over the arrays. failures: number of the offspring's
     episodes that ended early. mothers: [P] places of the population, or of its mothers, in the
     generation before; fathers: [P] places there of the fathers of those born in this generation,
-    else
-    `NO_PARENT`; None where that is not recorded. level: of the next generation's trials; None
-    without a curriculum.
+    else `NO_PARENT`; None where that is not recorded. level: of the next generation's trials; None
+    without a curriculum. best to worst: fitness of the population. forced: whether this generation
+    was. evaluations: offspring. episodes: those simulated to an end. sim_steps: of episodes;
+    computed_steps: with those of idle lanes.
     """
 
     generation: jax.Array
@@ -136,9 +136,9 @@ def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:
         and config.forced.patience
         and int(state.barren) >= config.forced.patience
     ):
-        return (
-            f"forced evolution no longer pays: {int(state.barren)} spells in a row without growth"
-        )
+        count = int(state.barren)
+        last = "the last phase" if count == 1 else f"the last {count} phases"
+        return f"forced evolution no longer pays: no growth in {last}"
     if int(state.generation) >= config.generations:
         return f"all {config.generations} generations are done"
     return None
@@ -193,102 +193,3 @@ def finite_mean(values: jax.Array) -> jax.Array:
         jnp.sum(jnp.where(finite, values, 0.0)) / jnp.maximum(jnp.sum(finite), 1),
         -jnp.inf,
     )
-
-
-def admitted(
-    config: EvolutionConfig, state: EvolutionState, fitness: jax.Array, candidates: jax.Array
-) -> jax.Array:
-    """Select the candidates [P + M] that a forced generation admits.
-
-    These are fit enough, best first, up to the room left in the phase.
-    """
-    old = jnp.sort(fitness[: config.population])
-    enough = old[
-        jnp.floor(config.forced.accept * jnp.float32(config.population - 1)).astype(jnp.int32)
-    ]
-    fit = candidates & (fitness >= enough) & jnp.isfinite(fitness)
-    place = jnp.argsort(jnp.argsort(jnp.where(fit, -fitness, jnp.inf), stable=True))
-    return fit & (place < _room(config) - state.refreshed)
-
-
-def _room(config: EvolutionConfig) -> jax.Array:
-    return jnp.clip(
-        jnp.round(config.forced.refresh * jnp.float32(config.population)),
-        1,
-        config.population - 1,
-    )
-
-
-def decided(whole: EvolutionConfig, state: EvolutionState) -> EvolutionState:
-    """Begin a forced phase when best and mean stall over the window; end it when it is done."""
-    config = whole.forced
-    best, mean = state.fitness[0], finite_mean(state.fitness)
-    bests, means = (
-        jnp.append(state.best_history[1:], best),
-        jnp.append(state.mean_history[1:], mean),
-    )
-    age = jnp.where(state.forced, state.spell_age + 1, 0)
-    spent = (jnp.asarray(config.limit) > 0) & (age >= config.limit)
-    ends = state.forced & (spent | (state.refreshed >= _room(whole)))
-    quiet = jnp.where(state.forced | (state.generation <= 0), 0, state.quiet + 1)
-    stalled = (quiet >= config.window) & ~_grown(bests, config.gain) & ~_grown(means, config.gain)
-    begins = stalled & ~state.forced & config.enabled
-    if state.normal is not None:  # an evolution strategy has no parents to mutate
-        begins = jnp.zeros((), bool)
-    first = ~jnp.isfinite(state.spell_best)
-    pays = first | _grown(jnp.stack([state.spell_best, best]), config.gain)
-    return dataclasses.replace(
-        state,
-        best_history=bests,
-        mean_history=means,
-        quiet=quiet,
-        forced=begins | (state.forced & ~ends),
-        spell_age=jnp.where(begins, 0, age).astype(jnp.int32),
-        refreshed=jnp.where(begins, 0, state.refreshed).astype(jnp.int32),
-        spell_best=jnp.where(begins, best, state.spell_best),
-        barren=jnp.where(begins, jnp.where(pays, 0, state.barren + 1), state.barren).astype(
-            jnp.int32
-        ),
-    )
-
-
-def restarted(config: RestartConfig, state: EvolutionState, complete: jax.Array) -> EvolutionState:
-    """Where the best has learnt nothing by now, let the next generation be a first one.
-
-    The population stays in the state until then, and nothing of it is kept.
-
-    complete: [] whether the first population, or that of the last restart, is all evaluated.
-    """
-    every = jnp.asarray(config.every)
-    due = (every > 0) & (state.generation > 0) & (state.generation % jnp.maximum(every, 1) == 0)
-    now = due & complete & (state.fitness[0] <= config.below)
-    count = state.fitness.shape[0]
-
-    def reset(old: jax.Array | None, new: jax.Array) -> jax.Array | None:
-        return None if old is None else jnp.where(now, new, old)
-
-    return dataclasses.replace(
-        begun_anew(state, now),
-        seeded=jnp.where(now, 0, state.seeded),
-        forced=state.forced & ~now,
-        rounds=reset(state.rounds, jnp.ones(count)),
-        family=reset(state.family, jnp.arange(count)),
-    )
-
-
-def begun_anew(state: EvolutionState, now: jax.Array) -> EvolutionState:
-    """Where now [], forget earlier growth: every individual's fitness has changed.
-
-    The window then begins with the next generation, because this one's best is still a fitness of
-    the old trials.
-    """
-    return dataclasses.replace(
-        state,
-        quiet=jnp.where(now, -1, state.quiet),
-        barren=jnp.where(now, 0, state.barren),
-        spell_best=jnp.where(now, -jnp.inf, state.spell_best),
-    )
-
-
-def _grown(history: jax.Array, gain: jax.Array | float) -> jax.Array:
-    return history[-1] - history[0] > gain * jnp.maximum(jnp.abs(history[0]), 1.0)

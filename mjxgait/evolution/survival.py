@@ -11,7 +11,8 @@ import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.traced import chosen
-from mjxgait.evolution.state import NO_PARENT, EvolutionState, Proposal, admitted
+from mjxgait.evolution.forced import admitted
+from mjxgait.evolution.state import NO_PARENT, EvolutionState, Proposal
 from mjxgait.evolution.variation import Variation, first_occurrence
 from mjxgait.types import Evaluation, Tree, pytree
 
@@ -80,7 +81,7 @@ def first_of_kind(
     variation: Variation,
     state: EvolutionState,
     proposal: Proposal,
-    verdicts: jax.Array,
+    round_terms: jax.Array,
     anew: jax.Array,
 ) -> jax.Array:
     """Return for each of the old and the offspring [P + M] whether it is the first of its kind.
@@ -89,8 +90,8 @@ def first_of_kind(
     its parent, so that neutral mutations drift.
 
     Args:
-      same: definition of a copy, `evolution.same`. verdicts: [M, R, F] terms of this round alone;
-        an individual without any is never first. anew: [] whether the first of the offspring are
+      same: definition of a copy, `evolution.same`. round_terms: [M, R, F] terms of this round
+        alone; an individual without any is never first. anew: [] whether the first of the offspring are
         old ones.
     """
     old, new = state.genomes, proposal.offspring
@@ -98,7 +99,7 @@ def first_of_kind(
     by_genome = jnp.where(anew, itself, first_occurrence(together(old, new)))
     if same == "genome":
         return by_genome
-    of_old, of_new = state.terms, verdicts
+    of_old, of_new = state.terms, round_terms
     worth: tuple[object, object] = of_old, of_new
     if variation.price is not None:
         worth = (of_old, variation.price(old)), (of_new, variation.price(new))
@@ -135,20 +136,20 @@ class Survival:
         proposal: Proposal,
         pool: Pool,
         fitness: jax.Array,
-        verdicts: jax.Array,
+        round_terms: jax.Array,
     ) -> tuple[EvolutionState, jax.Array]:
         """Return the P best of a pool without duplicates, and their places [P] in it.
 
         In a forced generation, offspring that are fit enough go before the old.
 
         Args:
-          fitness: [P + M]. verdicts: [M, R, F] terms of this round alone.
+          fitness: [P + M]. round_terms: [M, R, F] terms of this round alone.
         """
         config, places = self.config, jnp.arange(len(fitness))
         fresh = places >= config.population
         young = places >= config.population + config.elites
         anew = jnp.zeros((), bool) if self.anew is None else self.anew
-        first = first_of_kind(config.same, self.variation, state, proposal, verdicts, anew)
+        first = first_of_kind(config.same, self.variation, state, proposal, round_terms, anew)
         distinct = first | jnp.logical_not(config.remove_duplicates)
         taken_in = admitted(config, state, fitness, young & distinct)
         if self.anew is not None:  # The old were not simulated in this round.

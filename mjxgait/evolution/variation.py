@@ -95,10 +95,7 @@ def real_variation(box: Box, config: EvolutionConfig) -> Variation:
     """Return operators for genomes of reals in a box: uniform crossover, Gaussian jumps."""
 
     def cross(key: jax.Array, mother: Tree, father: Tree) -> Tree:
-        def mixed(key: jax.Array, a: jax.Array, b: jax.Array) -> jax.Array:
-            return jnp.where(jax.random.bernoulli(key, 0.5, a.shape), a, b)
-
-        return _leafwise(key, mixed, mother, father)
+        return _leafwise(key, uniform_crossover, mother, father)
 
     def mutate(key: jax.Array, genome: Tree) -> Tree:
         def moved(key: jax.Array, values: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
@@ -108,6 +105,11 @@ def real_variation(box: Box, config: EvolutionConfig) -> Variation:
 
     middle = narrowed(box, config.initial_spread)
     return Variation(create=creation(middle, config), cross=cross, mutate=mutate, box=box)
+
+
+def uniform_crossover(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.Array:
+    """Return an array of which each value is one parent's, with equal chances."""
+    return jnp.where(jax.random.bernoulli(key, 0.5, mother.shape), mother, father)
 
 
 def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Tree) -> Tree:

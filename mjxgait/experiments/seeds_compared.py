@@ -21,14 +21,13 @@ SIZE = (420, 300)
 
 
 @dataclasses.dataclass(frozen=True)
-class Found:
+class SeedResult:
     """Result of one run.
 
     summary, advice: the certificate's. margin: None if not examined.
     """
 
     folder: Path
-    examined: bool
     certified: bool
     summary: str
     margin: float | None
@@ -37,12 +36,12 @@ class Found:
     advice: tuple[str, ...] = ()
 
 
-def found_in(folders: Sequence[Path]) -> list[Found]:
+def found_in(folders: Sequence[Path]) -> list[SeedResult]:
     """Return the result of each run."""
     return [_found(folder) for folder in folders]
 
 
-def table(found: Sequence[Found]) -> Table:
+def table(found: Sequence[SeedResult]) -> Table:
     """Return the table for the screen, a row per run."""
     shown = Table(box=None, pad_edge=False)
     for heading in ("run", "motion", "margin", ""):
@@ -53,13 +52,13 @@ def table(found: Sequence[Found]) -> Table:
     return shown
 
 
-def size(found: Sequence[Found]) -> tuple[float, float]:
+def size(found: Sequence[SeedResult]) -> tuple[float, float]:
     """Return the picture's width and height in inches."""
     columns = min(len(found), COLUMNS)
     return 3.2 * columns, 0.4 + 2.8 * -(-len(found) // columns)
 
 
-def draw_seeds(drawing: Figure, name: str, found: Sequence[Found]) -> None:
+def draw_seeds(drawing: Figure, name: str, found: Sequence[SeedResult]) -> None:
     """Draw all champions as C MuJoCo simulates them, each as large as its picture allows."""
     columns = min(len(found), COLUMNS)
     fields = drawing.subplots(-(-len(found) // columns), columns, squeeze=False)
@@ -77,11 +76,11 @@ def draw_seeds(drawing: Figure, name: str, found: Sequence[Found]) -> None:
     )
 
 
-def _found(folder: Path) -> Found:
+def _found(folder: Path) -> SeedResult:
     document = read_certificate(folder / CERTIFICATE)
     if document is None:
-        return Found(folder, False, False, "", None, "not examined")
+        return SeedResult(folder, False, "", None, "not examined")
     verdict, report = verdict_of(document), document.get("report", {})
     said = () if verdict.passed else tuple(report.get(ADVICE, ()))
     summary, words = report.get("summary", ""), verdict.in_words()
-    return Found(folder, True, verdict.certified, summary, verdict.margin, words, said)
+    return SeedResult(folder, verdict.certified, summary, verdict.margin, words, said)

@@ -89,6 +89,8 @@ def summary(design: Design, trials: Mapping[str, Trial]) -> str:
     longest = 200 * max(part.half.max() for part in design.parts) * design.scale.length
     robot, evolved = trials[ROBOT], trials[EVOLVED]
     fate = "falls" if robot.fell else "does not fall"
+    if not np.isfinite(robot.distance):
+        fate = "blows up"
     return (
         f"{len(design.blocks)} blocks, the longest {longest:.0f} cm, {len(design.hinges)} servos, "
         f"{mass:.2f} kg. In the reference simulator it gets {robot.distance:.2f} m far in "
@@ -120,7 +122,7 @@ def _tried(design: Design, trials: Mapping[str, Trial], others: Sequence[Trial])
         for name, trial in trials.items()
     ]
     heads = ("body", "speed, m/s", "distance, m", "leap, cm", "falls", "torques cut short, %")
-    far = np.median([trial.distance for trial in others])
+    far = np.median(np.nan_to_num([trial.distance for trial in others]))
     fallen = sum(trial.fell for trial in others)
     return (
         f"C MuJoCo, {trials[ROBOT].seconds:.1f} s after it settled, in the motion of the champion's "

@@ -11,10 +11,10 @@ import numpy as np
 
 from mjxgait.controllers.sims_brain.reference import BrainReference
 from mjxgait.controllers.sims_brain.reference_body import (
+    CONTACT_TIME_CONSTANT,
     DENSITY,
     FRICTION,
     GRAVITY,
-    HARDEST,
     Part,
 )
 from mjxgait.controllers.sims_brain.reference_files import in_xml
@@ -134,7 +134,7 @@ def model_xml(body: Body, step: float) -> str:
     inner = ET.SubElement(root, "option", {**option, **exact})
     ET.SubElement(inner, "flag", eulerdamp="disable", autoreset="disable")
     solid = (*IMPEDANCE[:2], IMPEDANCE[2] * size, *IMPEDANCE[3:])
-    hard = {"solref": in_xml((HARDEST * step * time, 1.0)), "solimp": in_xml(solid)}
+    hard = {"solref": in_xml((CONTACT_TIME_CONSTANT * step * time, 1.0)), "solimp": in_xml(solid)}
     touch = {"friction": in_xml((FRICTION, 0.005, 0.0001)), **hard}
     assets, world = ET.SubElement(root, "asset"), ET.SubElement(root, "worldbody")
     plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": "1"}

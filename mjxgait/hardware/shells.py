@@ -212,20 +212,39 @@ def packed(
 
     half: [3] m, in any order. near: [3] m. taken: boxes that are there already.
     """
-    found: list[tuple[float, Packed]] = []
-    ways = np.vstack([np.eye(3), -np.eye(3)])
+    best: tuple[float, Packed] | None = None
     for sides in sorted(set(itertools.permutations(half.tolist()))):
         box = np.array(sides)
         room = Solid(cavity.normals, cavity.offsets - np.abs(cavity.normals) @ box)
-        # Each box beside it is on one of its six sides.
-        for chosen in itertools.product(range(6), repeat=len(taken)):
-            free = room
-            for way, other in zip(ways[list(chosen)], taken, strict=True):
-                free = free.cut([-way], -way @ other.middle - np.abs(way) @ (box + other.half))
-            place = _nearest(free, near)
-            if place is not None:
-                found.append((float(np.abs(place - near).sum()), Packed(place, box)))
-    return min(found, key=lambda one: one[0])[1] if found else None
+        best = _packed_beside(room, box, near, taken, best)
+    return None if best is None else best[1]
+
+
+def _packed_beside(
+    room: Solid,
+    box: np.ndarray,
+    near: np.ndarray,
+    taken: Sequence[Packed],
+    best: tuple[float, Packed] | None,
+) -> tuple[float, Packed] | None:
+    """Return the nearest place of a box beside others, with its distance in m; else the best known.
+
+    room: in which the box's middle may be. Each other box is on one of its six sides, and each side
+    that is chosen leaves less room. So a choice that is no nearer than the best is given up.
+    """
+    place = _nearest(room, near)
+    if place is None:
+        return best
+    distance = float(np.abs(place - near).sum())
+    if best is not None and distance >= best[0]:
+        return best
+    if not taken:
+        return distance, Packed(place, box)
+    other, *rest = taken
+    for way in np.vstack([np.eye(3), -np.eye(3)]):
+        free = room.cut([-way], -way @ other.middle - np.abs(way) @ (box + other.half))
+        best = _packed_beside(free, box, near, rest, best)
+    return best
 
 
 def _nearest(solid: Solid, near: np.ndarray) -> np.ndarray | None:

@@ -1,4 +1,4 @@
-"""Import of a model file (MJCF or URDF) as a creature folder."""
+"""Import of a model (MJCF, URDF, xacro) or a skeleton (BVH, GLB, FBX) as a creature folder."""
 
 from mjxgait.importer.convert import (
     TOML,

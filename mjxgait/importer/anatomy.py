@@ -54,7 +54,7 @@ def in_plane(model: mujoco.MjModel, root: int) -> bool:
     return SLIDE in types and types.count(HINGE) <= 1
 
 
-def tell_root_joints(model: mujoco.MjModel, root: int, notes: Notes) -> None:
+def report_root_joints(model: mujoco.MjModel, root: int, notes: Notes) -> None:
     """Report the replacement of the joints that hold the root in the world."""
     types = _types(model, root)
     if types == [FREE]:

@@ -53,7 +53,10 @@ def arms_of(model: mujoco.MjModel, anatomy: Anatomy, movable: Sequence[int]) -> 
     if len(anatomy.feet) != 2 or in_plane(model, anatomy.root):
         return []
     hinged = {int(model.jnt_bodyid[j]) for j in movable if int(model.jnt_type[j]) == HINGE}
-    hips = np.array([anatomy.xpos[b] for b in _hips(model, anatomy, hinged)])
+    first = _hips(model, anatomy, hinged)
+    if len(first) != 2:
+        return []
+    hips = anatomy.xpos[first]
     middle, across = hips.mean(0), (hips[0] - hips[1]) * [1, 1, 0]
     wide, floor = float(np.linalg.norm(across)), anatomy.low(anatomy.bodies)
     if wide < 1e-6:
@@ -83,10 +86,11 @@ def arms_of(model: mujoco.MjModel, anatomy: Anatomy, movable: Sequence[int]) -> 
 
 
 def _hips(model: mujoco.MjModel, anatomy: Anatomy, hinged: set[int]) -> list[int]:
-    """First body of each leg that moves and carries no other leg."""
+    """First body of each leg that turns by a hinge and carries no other leg, if it has one."""
     legs = [[b for b in reversed(ancestors(model, foot)) if b in hinged] for foot in anatomy.feet]
     shared = set(legs[0]) & set(legs[1])
-    return [next(b for b in leg if b not in shared) for leg in legs]
+    own = [[b for b in leg if b not in shared] for leg in legs]
+    return [leg[0] for leg in own if leg]
 
 
 def _chain(model: mujoco.MjModel, body: int, movable: Sequence[int]) -> tuple[int, ...]:

@@ -14,7 +14,7 @@ from mjxgait.importer.notes import Notes
 from mjxgait.importer.stand_test import Held, hold
 from mjxgait.plugins import resolve_config
 
-MOST = 0.5
+MAX_FEEDBACK = 0.5
 """rad, where the controller clips the feedback (docs/reference/controller.md)."""
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.0)
 """Shares of the full weight, tried in this order."""
@@ -95,6 +95,6 @@ def feedback(
         axes = turned @ level.T  # columns: the stance's forward, left and up in the current world
         angle = np.arcsin(np.clip(axes[2, 1] if axis == 0 else -axes[2, 0], -1, 1))
         rate = (turned @ data.qvel[3:6]) @ axes[:, axis]
-        return weights * np.clip(gain * angle + rate_gain * rate, -MOST, MOST)
+        return weights * np.clip(gain * angle + rate_gain * rate, -MAX_FEEDBACK, MAX_FEEDBACK)
 
     return correct

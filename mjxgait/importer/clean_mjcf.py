@@ -10,6 +10,7 @@ from mjxgait.importer.notes import Notes
 from mjxgait.importer.source import (
     MOST_ELEMENTS,
     MOST_INCLUDES,
+    MOST_NESTED,
     Places,
     Source,
     load_mesh,
@@ -88,10 +89,12 @@ def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None
             element.attrib.pop("material", None)
 
 
-def _include(tree: ET.Element, path: Path, places: Places, count: list[int]) -> None:
+def _include(
+    tree: ET.Element, path: Path, places: Places, count: list[int], depth: int = 0
+) -> None:
     """Put the content of included files in place, as MuJoCo does.
 
-    count: files and elements so far.
+    count: files and elements so far. depth: number of files that this one is included through.
     """
     for parent in list(tree.iter()):
         for i, child in reversed(list(enumerate(parent))):
@@ -100,14 +103,14 @@ def _include(tree: ET.Element, path: Path, places: Places, count: list[int]) -> 
             reference = child.get("file", "")
             found = places.find(reference)
             count[0] += 1
-            if found is None or count[0] > MOST_INCLUDES:
+            if found is None or count[0] > MOST_INCLUDES or depth > MOST_NESTED:
                 raise UserError(
                     f'{path}: <include file="{reference[:200]}"> is missing, outside of the '
                     "model's folder, or one too many; put it beside the model or name "
                     "its folder with --search"
                 )
             inner = parse_xml(found)
-            _include(inner, found, places, count)
+            _include(inner, found, places, count, depth + 1)
             count[1] += sum(1 for _ in inner.iter())
             if count[1] > MOST_ELEMENTS:
                 raise UserError(f"{path}: its includes hold more than {MOST_ELEMENTS} elements")

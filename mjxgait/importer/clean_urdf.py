@@ -12,7 +12,7 @@ import numpy as np
 
 from mjxgait.errors import UserError, did_you_mean, listed
 from mjxgait.importer.notes import Notes
-from mjxgait.importer.source import Places, Source, load_mesh, lost, numbers
+from mjxgait.importer.source import Places, Source, load_mesh, lost_mass, numbers
 
 KEPT = ("link", "joint", "material")
 COMPILER = {
@@ -146,7 +146,7 @@ def _shapes(source: Source, link: ET.Element, stated: bool, places: Places, note
             key = load_mesh(source, places, reference, [""], notes)
             if key is None:
                 if kind == "collision" and not stated:
-                    raise lost("", link.get("name", ""), reference)
+                    raise lost_mass("", link.get("name", ""), reference)
                 link.remove(shape)
             else:
                 mesh.set("filename", key)

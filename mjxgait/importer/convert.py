@@ -18,7 +18,7 @@ from mjxgait.importer.body import KinematicModel
 from mjxgait.importer.bones import add_bones
 from mjxgait.importer.drive import step_if_narrow, swing_arms
 from mjxgait.importer.find import find_anatomy
-from mjxgait.importer.notes import Notes, one_line, plain_names, tell_dropped, tell_left_out
+from mjxgait.importer.notes import Notes, one_line, plain_names, report_dropped, report_left_out
 from mjxgait.importer.orient import (
     find_forward,
     find_mirror,
@@ -131,7 +131,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     anatomy = find_anatomy(model, source.coupled, keep, choices.freeze, up, notes, source.limbs)
     if source.up:
         notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
-    tell_left_out(model, anatomy.bodies, notes)
+    report_left_out(model, anatomy.bodies, notes)
     place_bodies(model, anatomy)
     joints = add_joints(model, anatomy, source.efforts, notes)
     add_bones(anatomy.spec, notes)
@@ -166,7 +166,7 @@ def _compiled(source: Source, choices: ImportChoices, notes: Notes) -> mujoco.Mj
         for key, file in source.files.items():
             what = what.replace(f"({key})", f'"{file}"')
         notes.change(what, why)
-    tell_dropped(model, notes)
+    report_dropped(model, notes)
     return model
 
 

@@ -117,7 +117,7 @@ def plan_drive(
     reason += f", and {stronger:g} times as much, because it sank" if stronger > 1 else ""
     reason += "; more where a joint's own inertia needs it" if (kp == quick).any() else ""
     notes.guess("kp, kd", f"{np.median(kp):.3g}, {np.median(kd):.3g}", "medium", reason)
-    _tell_torque(torque, stated, notes)
+    _report_torque(torque, stated, notes)
     notes.guess(
         "range", "by what each joint does", "low", "40 degrees and less, within the file's limits"
     )
@@ -209,7 +209,7 @@ def _add_armature(kinematics: KinematicModel, drive: Drive, own: np.ndarray, not
         )
 
 
-def _tell_torque(torque: np.ndarray, stated: np.ndarray, notes: Notes) -> None:
+def _report_torque(torque: np.ndarray, stated: np.ndarray, notes: Notes) -> None:
     """Note the torque limits [J], and what became of those that the file states, else infinite."""
     known, used = np.isfinite(stated), torque == stated
     cut, raised = known & (torque < stated), known & (torque > stated)

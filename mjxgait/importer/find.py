@@ -15,7 +15,7 @@ from mjxgait.importer.anatomy import (
     Anatomy,
     find_root,
     measured,
-    tell_root_joints,
+    report_root_joints,
     unit_length,
     up_axis,
 )
@@ -62,7 +62,7 @@ def find_anatomy(
     spec = copy_bodies(model, bodies, scale)
     shapes = {b: shapes_of(spec, spec.bodies[i + 1], i) for i, b in enumerate(bodies)}
     anatomy = measured(model, qpos, axis, scale, spec, shapes)
-    tell_root_joints(model, root, notes)
+    report_root_joints(model, root, notes)
     _check_patterns(model, keep, freeze)
     movable = movable_joints(model, anatomy, coupled, freeze, notes)
     try:

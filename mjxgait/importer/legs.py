@@ -177,7 +177,7 @@ def limits_around(
             model.jnt_range[j] if model.jnt_range[j][0] < model.jnt_range[j][1] else (-1.6, 1.6)
             for j in joints
         ]
-    )
+    ).reshape(-1, 2)
     ends = np.maximum(limits[:, 0], q - 2.0), np.minimum(limits[:, 1], q + 2.0)
     return np.minimum(*ends), np.maximum(*ends)
 

@@ -40,14 +40,15 @@ class Notes:
 
     def change(self, what: str, why: str) -> None:
         """Report a change."""
-        change = Change(what, why)
+        change = Change(one_line(what), one_line(why))
         if change not in self.changes:
             self.changes.append(change)
 
     def guess(self, what: str, value: str, confidence: Confidence, reason: str) -> None:
         """Report a guess; a later guess of the same thing replaces the earlier."""
-        self.guesses = [g for g in self.guesses if g.what != what]
-        self.guesses.append(Guess(what, value, confidence, reason))
+        guess = Guess(one_line(what), one_line(value), confidence, one_line(reason))
+        self.guesses = [g for g in self.guesses if g.what != guess.what]
+        self.guesses.append(guess)
 
     def text(self) -> str:
         """Return the report in plain lines."""
@@ -83,7 +84,7 @@ def plain_names(names: list[str], fallback: list[str]) -> list[str]:
     return result
 
 
-def tell_dropped(model: mujoco.MjModel, notes: Notes) -> None:
+def report_dropped(model: mujoco.MjModel, notes: Notes) -> None:
     """Report the file's mechanisms that do not act on the creature."""
     for count, what, why in (
         (model.nu, "actuators", "joint torques are applied directly; their limits were read"),
@@ -113,7 +114,7 @@ def tell_dropped(model: mujoco.MjModel, notes: Notes) -> None:
     )
 
 
-def tell_left_out(model: mujoco.MjModel, bodies: list[int], notes: Notes) -> None:
+def report_left_out(model: mujoco.MjModel, bodies: list[int], notes: Notes) -> None:
     """Report the rest of the file's world: bodies other than these, geoms that can be touched."""
     own = {*bodies, *ancestors(model, bodies[0])}
     others = [b for b in range(1, model.nbody) if b not in own and model.body_parentid[b] == 0]

@@ -117,12 +117,12 @@ def _camera(creature: Creature, painter: Painter, places: tuple[np.ndarray, np.n
 def _mark_feet(
     draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData
 ) -> None:
-    for g in creature.feet.watched[: len(creature.feet.foot_of)]:
+    for g in creature.feet.stepping:
         _ring(draw, camera.pixels(data.geom_xpos[g]), 13, FOOT)
     for g in creature.feet.ground:
         _ring(draw, camera.pixels(data.geom_xpos[g]), 13, GROUND)
     for foot, name in enumerate(creature.feet.names):
-        geom = creature.feet.watched[np.flatnonzero(creature.feet.foot_of == foot)[0]]
+        geom = creature.feet.geoms_of(foot)[0]
         x, y = camera.pixels(data.geom_xpos[geom])
         draw.text((x, y + 16), name, fill=FOOT, font=font(13), anchor="ma")
 

@@ -10,7 +10,7 @@ from mjxgait.files import read_bytes
 from mjxgait.importer.clean_mjcf import clean_mjcf
 from mjxgait.importer.clean_urdf import clean_urdf
 from mjxgait.importer.notes import Notes
-from mjxgait.importer.rigged import RIGS, model_of
+from mjxgait.importer.rigged import RIGS, source_of_rig
 from mjxgait.importer.source import MOST_XML, Places, Source, parse_text, parse_xml
 from mjxgait.importer.xacro import TEMPLATE, expanded
 
@@ -34,7 +34,7 @@ def source_of(
                 f"--height is for skeletons ({', '.join(RIGS)}); {path} has its lengths"
             )
         return read_source(path, search, notes)
-    return model_of(path, up, height, notes)
+    return source_of_rig(path, up, height, notes)
 
 
 def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:

@@ -230,7 +230,7 @@ class Plan:
         for first in self.limbs:
             for bone in self.limb(first):
                 low = rig.places[bone, self.up] - floor < ANKLE_HIGH * self.height
-                if low and toes(self, bone):
+                if low and foot_direction(self, bone):
                     found.append(bone)
                     break
         return found if len(found) == 2 else []
@@ -252,10 +252,10 @@ class Plan:
         if bone not in self.feet:
             return []
         spots = self.spots_below(bone)
-        ahead = toes(self, bone) * spots[:, self.ahead]
+        ahead = foot_direction(self, bone) * spots[:, self.ahead]
         heel, toe = spots[0].copy(), spots[ahead.argmax()].copy()
         heel[self.ahead] -= HEEL * (toe - heel)[self.ahead]
-        if ahead.min() < toes(self, bone) * heel[self.ahead]:
+        if ahead.min() < foot_direction(self, bone) * heel[self.ahead]:
             heel[self.ahead] = spots[ahead.argmin(), self.ahead]
         heel[self.up] = toe[self.up] = self.floor + radius
         return [(heel, toe)]
@@ -271,7 +271,7 @@ class Plan:
         return self._length(bone) > SHORT * self.height
 
 
-def toes(plan: Plan, foot: int) -> float:
+def foot_direction(plan: Plan, foot: int) -> float:
     """Direction of a foot along the forward axis: 1, -1, or 0 if it does not point along it."""
     way = plan.way(foot)
     share = float(way[plan.ahead]) / max(float(np.linalg.norm(way)), 1e-9)

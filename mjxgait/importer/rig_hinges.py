@@ -10,7 +10,7 @@ import itertools
 import numpy as np
 
 from mjxgait.importer.notes import Confidence
-from mjxgait.importer.rig import SHORT, Plan, toes
+from mjxgait.importer.rig import SHORT, Plan, foot_direction
 
 MOVING, GIRDLE = 3, 0.75
 """Most bones of a leg that move; share of the next bone's distance from the middle within which a
@@ -78,7 +78,7 @@ def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
     found[chain[0]] = _hip(plan, int(along.argmax()))
     for (one, other), bone in zip(itertools.pairwise(ways), chain[1:], strict=True):
         is_last = bone == chain[-1]
-        found[bone] = [_knee(plan, one, other, is_last, vertical, toes(plan, chain[-1]))]
+        found[bone] = [_knee(plan, one, other, is_last, vertical, foot_direction(plan, chain[-1]))]
 
 
 def _bending(plan: Plan, first: int) -> list[int]:

@@ -36,7 +36,7 @@ METRES, CENTIMETRES = 4.0, 400.0
 """
 
 
-def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> Source:
+def source_of_rig(path: Path, up: str | None, height: float | None, notes: Notes) -> Source:
     """Return the model of the skeleton in a BVH, GLB or FBX file.
 
     Args:

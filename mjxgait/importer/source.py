@@ -29,6 +29,9 @@ MOST_ELEMENTS, MOST_ATTRIBUTES, MOST_DEPTH, MOST_INCLUDES = 20_000, 100, 200, 40
 
 MuJoCo's own elements have up to 40 attributes.
 """
+MOST_NESTED = 2
+"""Files that one is included through. Each may be `MOST_DEPTH` deep, and Python writes at most a
+thousand levels."""
 READABLE_MESHES = (".stl", ".obj", ".msh")
 MODEL_FOLDERS = frozenset(("mjcf", "model", "models", "robots", "sdf", "urdf", "xml", "xmls"))
 """Names of a folder for models inside a package that holds their meshes in another folder."""
@@ -220,7 +223,7 @@ def leave_out(spec: mujoco.MjSpec, missing: Mapping[str, str]) -> None:
             if _counts(spec, geom):
                 unreadable = f"{geom.meshname} (it is there, but not as MuJoCo wants it)"
                 file = missing[files[geom.meshname]] or unreadable
-                raise lost(geom.name, geom.parent.name, file, geom.mass)
+                raise lost_mass(geom.name, geom.parent.name, file, geom.mass)
             spec.delete(geom)
     for name in files:
         spec.delete(spec.mesh(name))
@@ -236,10 +239,10 @@ def _counts(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
     return bool(moves and weighs and not stated and low <= geom.group <= high)
 
 
-def lost(shape: str, body: str, file: str, mass: float = float("nan")) -> UserError:
+def lost_mass(shape: str, body: str, file: str, mass: float = float("nan")) -> UserError:
     """Return the error for a mass that would be lost. mass: kg; NaN if only the mesh states it."""
     of = f'"{shape}" of body "{body}"' if shape else f'a shape of body "{body}"'
-    weight = f"{mass:.3g} kg" if mass == mass else "a mass that only its mesh tells"
+    weight = f"{mass:.3g} kg" if mass == mass else "a mass that only its mesh states"
     return UserError(
         f'{of} has {weight}, and its mesh "{file}" cannot be read: put the file beside the model, '
         "name its folder with --search, or state the body's mass in an <inertial>"

@@ -4,7 +4,7 @@ They are copied from the compiled file. Nothing else of the file, such as its de
 reaches the physics backends; all of them can simulate what is here.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -101,28 +101,28 @@ def add_joints(
     spec, scale = anatomy.spec, anatomy.scale
     spec.bodies[1].add_freejoint(name="root")
     bodies = dict(zip(anatomy.bodies, spec.bodies[1:], strict=True))
-    names = plain_names(
-        [model.joint(j).name for j in anatomy.active], [f"joint_{j}" for j in anatomy.active]
-    )
+    names = _joint_names(model, anatomy.active)
     source, effort, degrees = [], [], []
-    for name, j in zip(names, anatomy.active, strict=True):
+    for j in anatomy.active:
         pos, armature = scale * model.jnt_pos[j], float(model.dof_armature[model.jnt_dofadr[j]])
         low, high = model.jnt_range[j] if model.jnt_range[j][0] < model.jnt_range[j][1] else (0, 0)
-        ref, axes = float(model.qpos0[model.jnt_qposadr[j]]), {name: model.jnt_axis[j]}
+        own = names[j]
+        ref, axes = float(model.qpos0[model.jnt_qposadr[j]]), [model.jnt_axis[j]]
         if int(model.jnt_type[j]) != HINGE:
             reach = model.jnt_range[j][1] if model.jnt_limited[j] else 0.0
             low, high, ref = -reach, reach, 0.0
-            axes = {f"{name}_{x}": axis for x, axis in zip("xyz", np.eye(3), strict=True)}
+            axes = [*np.eye(3)]
             notes.change(
-                f'ball joint "{name}" written as the three hinges {name}_x, {name}_y and {name}_z',
+                f'ball joint "{model.joint(j).name}" written as the three hinges {own[0]}, '
+                f"{own[1]} and {own[2]}",
                 "the controller's key poses are angles",
             )
         elif max(abs(low), abs(high)) > MOST_RADIANS:
             low, high = np.radians(low), np.radians(high)
-            degrees.append(name)
-        for own, axis in axes.items():
+            degrees.append(own[0])
+        for name, axis in zip(own, axes, strict=True):
             bodies[int(model.jnt_bodyid[j])].add_joint(
-                name=own, pos=pos, axis=axis, range=(low, high), ref=ref, armature=armature
+                name=name, pos=pos, axis=axis, range=(low, high), ref=ref, armature=armature
             )
             source.append(j)
             effort.append(efforts.get(model.joint(j).name, _stated_torque(model, j)))
@@ -132,6 +132,23 @@ def add_joints(
             "they are beyond two turns if they are in radians",
         )
     return source, np.array(effort)
+
+
+def _joint_names(model: mujoco.MjModel, joints: Sequence[int]) -> dict[int, list[str]]:
+    """Return the names of the hinges of each joint in the file: one, or three of a ball joint."""
+    hinges = [
+        (j, end)
+        for j in joints
+        for end in (("",) if int(model.jnt_type[j]) == HINGE else ("_x", "_y", "_z"))
+    ]
+    wanted = [f"{model.joint(j).name or f'joint_{j}'}{end}" for j, end in hinges]
+    fallback = [f"joint_{j}{end}" for j, end in hinges]
+    # The free joint is called root.
+    unique = plain_names(["root", *wanted], ["root", *fallback])[1:]
+    found: dict[int, list[str]] = {}
+    for (j, _), name in zip(hinges, unique, strict=True):
+        found.setdefault(j, []).append(name)
+    return found
 
 
 def _stated_torque(model: mujoco.MjModel, joint: int) -> float:

@@ -53,7 +53,7 @@ def stand_test(creature: Creature) -> Held:
     """Run the stand test for two seconds."""
     feet = {
         creature.model.geom(int(g)).name
-        for g in [*creature.feet.watched[: len(creature.feet.foot_of)], *creature.feet.ground]
+        for g in [*creature.feet.stepping, *creature.feet.ground_ids]
     }
     return hold(
         creature.model,

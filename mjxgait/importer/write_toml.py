@@ -12,6 +12,8 @@ from mjxgait.importer.drive import Drive
 from mjxgait.importer.notes import one_line
 from mjxgait.importer.standing import Candidate
 
+FINE = 0.005
+"""Gains below this are written with four digits instead of four decimals."""
 GAIT = "gait"
 """Guess that a character walks as an animal of its number of feet does."""
 
@@ -69,11 +71,16 @@ def creature_toml(
     return "\n".join(lines)
 
 
+def _rounded(gains: np.ndarray) -> np.ndarray:
+    """Round to four decimals, and those that this would spoil to four digits."""
+    digits = np.array([float(f"{gain:.4g}") for gain in gains])
+    return np.where(np.abs(gains) < FINE, digits, np.round(gains, 4))
+
+
 def _joints(joints: list[str], drive: Drive, remark: Mapping[str, str]) -> list[str]:
     """Lines of the common joint values and of each joint's own."""
-    kp, kd, torque, ranges = (
-        np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges)
-    )
+    kp, kd, torque = (_rounded(v) for v in (drive.kp, drive.kd, drive.torque))
+    ranges = np.round(drive.ranges, 4)
     lines = [
         "[joints]",
         f"kp = {_usual(kp)}{remark.get('kp, kd', '')}",

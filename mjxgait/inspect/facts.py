@@ -39,6 +39,7 @@ KINDS = {
     Origin.CROSSOVER: "crossover",
     Origin.MUTATION: "mutation",
     Origin.NEWCOMER: "newcomer",
+    Origin.DRAWN: "drawn",
 }
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from mjxgait.controllers.sims_brain.reference_body import Part, grow
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import Origin
-from mjxgait.training.family import BODY, FAMILY, Newborns, read_newborns
+from mjxgait.training.family import FAMILY, GRAPH_PREFIX, Newborns, read_newborns
 from mjxgait.training.logs import FATHERS, MOTHERS, Line, parent
 
 Body = Mapping[str, np.ndarray]
@@ -149,7 +149,7 @@ def mixed(child: Relative, mother: Relative, father: Relative) -> str:
 
 def connected(body: Body) -> list[int]:
     """Return the nodes that are reached from the first, in order."""
-    target, used = body[f"{BODY}target"].astype(int), body[f"{BODY}used"] > 0
+    target, used = body[f"{GRAPH_PREFIX}target"].astype(int), body[f"{GRAPH_PREFIX}used"] > 0
     found, waiting = {0}, [0]
     while waiting:
         node = waiting.pop()
@@ -160,12 +160,13 @@ def connected(body: Body) -> list[int]:
 
 
 def _nodes(body: Body) -> range:
-    return range(len(body[f"{BODY}half"]))
+    return range(len(body[f"{GRAPH_PREFIX}half"]))
 
 
 def _alike(one: Body, node: int, other: Body, place: int) -> float:
     """Share of a node's numbers that are exactly those of another."""
-    pairs = [(one[f"{BODY}{name}"][node], other[f"{BODY}{name}"][place]) for name in COPIED]
+    names = [f"{GRAPH_PREFIX}{name}" for name in COPIED]
+    pairs = [(one[name][node], other[name][place]) for name in names]
     same = [np.ravel(a == b) for a, b in pairs]
     return float(np.concatenate(same).mean())
 

@@ -47,7 +47,7 @@ def print_individual(individual: Facts, console: Console) -> None:
         f"{individual['kind']}, born in generation {individual['born']}",
         style="bold",
     )
-    starts = len(next(iter(individual["terms"].values())))
+    starts = len(next(iter(individual["terms"].values()), ()))
     table = titled_table("fitness terms, one column per start (the first is undisturbed)", console)
     for heading in ("term", *(f"start {i + 1}" for i in range(starts)), "gives"):
         table.add_column(heading, justify="left" if heading == "term" else "right")
@@ -156,8 +156,9 @@ def _print_history(facts: Facts, console: Console) -> None:
         for i in range(len(history))
     ][::-1][::stride][::-1]
     console.print(
-        f"\n[bold]history[/] of generations {history[0]['generation']} to "
-        f"{history[-1]['generation']}, fitness {low:.2f} to {high:.2f}"
+        f"\nhistory of generations {history[0]['generation']} to "
+        f"{history[-1]['generation']}, fitness {low:.2f} to {high:.2f}",
+        style="bold",
     )
     for key in ("best", "mean"):
         console.print(f"{key:7} {sparkline([line[key] for line in thinned], low, high)}")

@@ -79,5 +79,5 @@ def fallback_note(model: mujoco.MjModel) -> str:
 def _cost(reason: UnsupportedModel) -> str:
     return (
         f"Plain MJX simulates this creature; a step takes {SLOWER} times as long as in the fast "
-        f"physics, which does not know this: {reason}"
+        f"physics, which does not support this: {reason}"
     )

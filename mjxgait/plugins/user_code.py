@@ -21,7 +21,7 @@ from mjxgait.certification.acceptance import HasCriteria, PlainCriteria
 from mjxgait.champion import Champion
 from mjxgait.config.schema import UseConfig
 from mjxgait.config.tables import build
-from mjxgait.controllers.config import holds
+from mjxgait.controllers.config import check_every
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.kinds import ControllerKind, TaskKind, register, shipped
@@ -135,7 +135,7 @@ def load(kind: str, text: str) -> str:
         raise UserError(f"{path}: {name} lacks {', '.join(missing)}")
     every = getattr(cls, "every", 1)
     try:
-        holds(every)
+        check_every(every)
     except ValueError as error:
         raise UserError(f"{path}: {name}.every = {every}: {error}") from None
     known = f"{path.name}:{name}"

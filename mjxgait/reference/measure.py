@@ -11,11 +11,11 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import posed
+from mjxgait.reference.frames import FrameReader
 from mjxgait.reference.grown import Grown, seen_grown
 from mjxgait.reference.layout import foot_middles, level_nose, start_frame
 from mjxgait.reference.outcome import Trajectory
 from mjxgait.reference.overlap import overlaps
-from mjxgait.reference.sight import Sight
 from mjxgait.reference.starts import Starts
 from mjxgait.reference.terrain import terrain_of
 
@@ -67,7 +67,7 @@ class Recording:
     heading: [T] rad of the trunk, left of the start's forward, without jumps.
     goal: m ahead of the start; 0 if the task has none.
     light: [3] m, place in the world; None if the task has none.
-    clearance: [T] m to the bar, `layout.FAR` at most; None if the task has none.
+    clearance: [T] m to the bar, `bar.FAR` at most; None if the task has none.
     grown: additional measurements of a modular body; None for others.
     foot_ahead: [T, N] m along the trunk's nose from the trunk to the foot; None if not measured.
     overlap_pairs: names of the P pairs of parts that ever overlap. overlap: [T, P] m, depth.
@@ -175,14 +175,14 @@ def measure(
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
     bar = None if aimed is None or np.isinf(aimed.bar[row, 0]) else aimed.bar[row]
     light = None if aimed is None or not aimed.light[row].any() else aimed.light[row]
-    sight = _replayed(creature, qpos, qvel, torque, bar)
+    frames = _replayed(creature, qpos, qvel, torque, bar)
     forward, left, up = (
-        sight.trunk_rot @ axis
+        frames.trunk_rot @ axis
         for axis in (creature.frame.forward, creature.frame.left, creature.frame.up)
     )
-    moved = sight.trunk_pos - start.place * [1, 1, 0]
+    moved = frames.trunk_pos - start.place * [1, 1, 0]
     ground = terrain_of(creature)
-    above = moved[:, 2] - (ground.height(*sight.trunk_pos[:, :2].T) if ground else 0.0)
+    above = moved[:, 2] - (ground.height(*frames.trunk_pos[:, :2].T) if ground else 0.0)
     crossed = overlaps(creature, qpos if inside else qpos[:0], excused=drag is None)
     return Recording(
         dimensions=dimensions(creature),
@@ -194,20 +194,20 @@ def measure(
         joint_pos=qpos[:, creature.joints.qpos_adr],
         joint_vel=qvel[:, creature.joints.dof_adr],
         torque=torque,
-        foot_force=sight.foot_force,
-        foot_slip=sight.foot_slip,
-        foot_height=sight.foot_height,
-        touch=sight.touch,
-        penetration=sight.penetration,
-        body_speed=sight.body_speed,
+        foot_force=frames.foot_force,
+        foot_slip=frames.foot_slip,
+        foot_height=frames.foot_height,
+        touch=frames.touch,
+        penetration=frames.penetration,
+        body_speed=frames.body_speed,
         overlap_pairs=crossed.pairs,
         heading=np.unwrap(np.arctan2(forward @ start.left, forward @ start.forward)),
         overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
         goal=0.0 if aimed is None else float(aimed.goal[row]),
-        clearance=None if bar is None else sight.clearance,
+        clearance=None if bar is None else frames.clearance,
         light=None if light is None else start.place + light,
         grown=None if drag is None else seen_grown(creature, qpos, qvel, drag),
-        foot_ahead=_ahead(sight),
+        foot_ahead=_ahead(frames),
     )
 
 
@@ -217,21 +217,22 @@ def _replayed(
     qvel: np.ndarray,
     torque: np.ndarray,
     bar: np.ndarray | None,
-) -> Sight:
+) -> FrameReader:
     """Set every frame [T] in C MuJoCo, up to the first that is not finite."""
-    sight = Sight(creature, len(qpos), bar)
+    frames = FrameReader(creature, len(qpos), bar)
     for k in range(len(qpos)):
         if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
             break
-        sight.look(k, qpos[k], qvel[k], torque[k])
-    sight.finish()
-    return sight
+        frames.read(k, qpos[k], qvel[k], torque[k])
+    frames.finish()
+    return frames
 
 
-def _ahead(sight: Sight) -> np.ndarray:
+def _ahead(frames: FrameReader) -> np.ndarray:
     """Return the distance [T, N] in m from the trunk to each foot, along its level nose."""
-    apart = foot_middles(sight.creature, sight.geom_xpos) - sight.trunk_pos[:, None]
-    found: np.ndarray = np.einsum("tnx,tx->tn", apart, level_nose(sight.creature, sight.trunk_rot))
+    apart = foot_middles(frames.creature, frames.geom_xpos) - frames.trunk_pos[:, None]
+    nose = level_nose(frames.creature, frames.trunk_rot)
+    found: np.ndarray = np.einsum("tnx,tx->tn", apart, nose)
     return found
 
 

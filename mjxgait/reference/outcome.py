@@ -86,7 +86,7 @@ class Outcome:
 
     fell: [S] s, infinite without a fall. travel: [S, 3] m forward, left and up from the start until
     the end or the fall.
-    clearance: [S] m, least distance to the bar, `layout.FAR` at most; infinite without a bar.
+    clearance: [S] m, least distance to the bar, `bar.FAR` at most; infinite without a bar.
     The next six have a value after each control step and NaN from the fall on. They are empty if
     the task does not need them (`path` and `aside` are never empty):
     path, aside: [S, T] m of the trunk forward, and to the left.

@@ -30,7 +30,8 @@ class State:
     mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
     constraint_force: [S, nv], from the previous step.
     light: [S, F, 3] direction in the axes of each foot's geom, 0 without a light; empty if unused.
-    goal, bar: [S] m ahead of the start; None if the task has none.
+    goal, bar: [S] m ahead of the start; without them 0 and infinite. None where a state is made
+    without a task.
     """
 
     start: StartFrame
@@ -143,7 +144,10 @@ def sense(creature: Creature, state: State, names: Collection[str]) -> dict[str,
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Drive:
-    """Conversion of a command to joint torques. step: s between two commands."""
+    """Conversion of a command to joint torques.
+
+    step: s, time step of the simulation; a command may be held for several.
+    """
 
     creature: Creature
     settings: DriveConfig

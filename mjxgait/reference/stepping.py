@@ -13,10 +13,10 @@ import numpy as np
 
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
+from mjxgait.reference.bar import Clearance
 from mjxgait.reference.bodies import Bodies, wrapped
 from mjxgait.reference.contest import Opponent
 from mjxgait.reference.controllers import ReferenceController, opponent_of, reference_of
-from mjxgait.reference.layout import Clearance
 from mjxgait.reference.outcome import (
     Fall,
     Outcome,
@@ -43,7 +43,7 @@ def examined_model(creature: Creature) -> mujoco.MjModel:
     return model
 
 
-class Around(Protocol):
+class TaskRules(Protocol):
     """Properties of the task that a simulation needs; see `acceptance.AcceptanceCriteria`."""
 
     drag: float
@@ -54,12 +54,8 @@ class Around(Protocol):
         """See `acceptance.AcceptanceCriteria`."""
         ...
 
-    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `acceptance.AcceptanceCriteria`."""
-        ...
 
-
-class Stepping:
+class ReferenceSimulation:
     """Simulations; the first `record` of them are recorded."""
 
     def __init__(
@@ -69,7 +65,7 @@ class Stepping:
         starts: Starts,
         record: int,
         fall: Fall,
-        task: Around,
+        task: TaskRules,
         reference: ReferenceController | None = None,
         threads: int = 1,
     ) -> None:
@@ -96,12 +92,12 @@ class Stepping:
         self,
         steps: int,
         heading: np.ndarray | None,
-        tell: Callable[[np.ndarray], bool] | None = None,
+        tell: Callable[[Outcome, int], bool] | None = None,
     ) -> Outcome:
         """Run to the end; a fallen simulation stops unless it is recorded.
 
         heading: [S, T] rad, commanded; None without commands. tell: called every `EVERY` steps with
-        the simulations [S] that can no longer succeed; returns whether all may end.
+        the outcome so far and the number of steps; returns whether all may end.
         """
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         film = blank_film(self.creature, time_step, self.record, steps)
@@ -115,7 +111,7 @@ class Stepping:
         for k in range(steps):
             if not len(running):
                 break
-            if tell is not None and k % EVERY == 0 and tell(self.task.lost(seen, self.starts, k)):
+            if tell is not None and k % EVERY == 0 and tell(seen, k):
                 break
             released = waiting[self.push_step[waiting] == k]
             if len(released) and np.isinf(seen.fell[leader]):
@@ -165,7 +161,7 @@ class Stepping:
     def _alike(self, heading: np.ndarray | None) -> tuple[int, np.ndarray]:
         """Return one of the simulations that are identical until pushed, and those it represents.
 
-        Stepping only this one until then saves a quarter of all steps.
+        ReferenceSimulation only this one until then saves a quarter of all steps.
         """
         starts, alike = self.starts, np.flatnonzero(self.starts.undisturbed)
         lights = starts.light, starts.moved_light, starts.light_time

@@ -1,4 +1,5 @@
 """Ground of the reference simulator: heights in NumPy, a MuJoCo field (docs/reference/ground.md).
+
 It shares only the specification of the ground with the one used in evolution.
 """
 

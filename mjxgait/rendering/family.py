@@ -16,7 +16,7 @@ from mjxgait.champion import Champion
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.files import replaced, require_ending
+from mjxgait.files import replaced, require_ending, writing
 from mjxgait.inspect.family import Birth, Family, Relative, Step, body_changes
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.rendering.curves import ACCENT, DARK, MIDDLE, PALE, figure, titled
@@ -30,7 +30,7 @@ COLUMNS, WIDTH, GAP = 6, 2.2, 0.16
 """Pictures in a row; width of each, and of the gap that it includes, in inches."""
 TALL, TEXT, ABOVE, AXIS, HEAD = 1.53, 0.7, 1.25, 1.6, 0.55
 """Heights in inches of a picture, the text below, a father above, the axis and the title."""
-MOST = 48
+MAX_BODIES = 48
 """Largest number of pictures; of a longer line the latest are shown, and the first."""
 
 
@@ -55,13 +55,13 @@ def draw_family_tree(run: Path, out: Path) -> None:
     with figure(tree.size) as drawing:
         drawing.set_layout_engine("none")
         tree.draw(drawing, latest.lines, subject)
-        with replaced(out) as beside:
+        with writing(out), replaced(out) as beside:
             drawing.savefig(beside)
 
 
 def _fitting(steps: Sequence[Step]) -> list[Step]:
     """Return the first and the latest changes, as many as are shown."""
-    return [*steps] if len(steps) <= MOST else [steps[0], *steps[1 - MOST :]]
+    return [*steps] if len(steps) <= MAX_BODIES else [steps[0], *steps[1 - MAX_BODIES :]]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

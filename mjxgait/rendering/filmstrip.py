@@ -67,7 +67,7 @@ def draw_filmstrip(drawing: Figure, walk: Walk) -> None:
 
 SPACING = 0.45
 """Approximate distance between moments in body lengths."""
-MOST = 30
+MAX_MOMENTS = 30
 """Largest number of moments in a picture; a longer way spaces them farther apart."""
 ROOM = 1.35
 """Height of the picture, in units of the highest point."""
@@ -79,7 +79,7 @@ ELEVATION = np.radians(8.0)
 def moments(walk: Walk) -> np.ndarray:
     """Return frames at even distances along the way, from the first to the farthest."""
     way = np.maximum.accumulate((walk.trunk_pos[:, :2] - walk.trunk_pos[0, :2]) @ walk.forward)
-    count = min(round(way[-1] / (SPACING * walk.creature.frame.body_length)) + 1, MOST)
+    count = min(round(way[-1] / (SPACING * walk.creature.frame.body_length)) + 1, MAX_MOMENTS)
     return np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], count)))
 
 

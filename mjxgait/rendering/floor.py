@@ -133,6 +133,7 @@ def facet_lines(
     camera: Camera, origin: np.ndarray, step: float, level: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return lines that cover the picture, in m ahead of and left of the origin; bands end on some.
+
     level: m, height of the ground in mid-picture.
     """
     sideways = np.array([-camera.forward[1], camera.forward[0]])

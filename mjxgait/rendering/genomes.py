@@ -135,7 +135,7 @@ STANDING = 0.1
 """Simulated seconds; only the first moment is shown."""
 SIZE = (480, 360)
 """Pixels of a body's picture."""
-MOST = 8
+MAX_BODIES = 8
 """Largest number of bodies in a row."""
 COPIES = ("", "\nmirrored", "\na pair")
 ALONG = (0.6, 0.45, 0.3)
@@ -170,7 +170,7 @@ def bodies_of(run: Path, champion: Champion) -> Row:
     descend = len(line) > 1
     places = line if descend else dict.fromkeys(latest.generations, 0)
     known = [generation for generation in latest.generations if generation in places]
-    chosen = np.linspace(0, len(known) - 1, min(len(known), MOST)).round().astype(int)
+    chosen = np.linspace(0, len(known) - 1, min(len(known), MAX_BODIES)).round().astype(int)
     shown = {known[i]: places[known[i]] for i in np.unique(chosen)}
     return Row(in_generations(run, shown, STANDING), descend)
 

@@ -312,6 +312,7 @@ class Stage:
 
     def _path(self, participant: Participant) -> np.ndarray:
         """Path [frames, 3] m of the middle: ahead of the start, to its left, the ground's height.
+
         For a swimmer its rise instead of that height.
         """
         steps = [participant.frame(frame * self.time_step) for frame in range(self.frames)]

@@ -13,13 +13,14 @@ import mujoco
 import numpy as np
 
 from mjxgait.certification import Lack, NoCertificate, certificate_state
-from mjxgait.certification.acceptance import how_simulated
+from mjxgait.certification.acceptance import task_rules
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.controllers.sims_brain.reference_body import THEIRS, grow, opponent_genome
 from mjxgait.creature import Creature
-from mjxgait.reference.layout import RADIUS, Ground, StartFrame, start_frame
+from mjxgait.reference.bar import RADIUS
+from mjxgait.reference.layout import Ground, StartFrame, start_frame
 from mjxgait.reference.measure import Recording, measure, stride_starts
 from mjxgait.reference.outcome import Trajectory
 from mjxgait.reference.starts import Starts, nominal_starts
@@ -179,7 +180,7 @@ class Walk:
 
     def _goals(self, first: np.ndarray) -> np.ndarray:
         """All goals [goals] of the walk, m ahead of the start."""
-        goals, next_goal = list(first[first > 0]), how_simulated(self.champion.task).next_goal
+        goals, next_goal = list(first[first > 0]), task_rules(self.champion.task).next_goal
         farthest = ((self.trunk_pos[:, :2] - self.trunk_pos[0, :2]) @ self.forward).max()
         while len(goals) and (after := next_goal(goals[-1], goals[0], farthest)) > goals[-1]:
             goals.append(after)
@@ -211,7 +212,7 @@ class Walk:
     @property
     def afloat(self) -> bool:
         """True if the creature is in water, where its height is free."""
-        return how_simulated(self.champion.task, self.champion.wish).drag > 0
+        return task_rules(self.champion.task, self.champion.wish).drag > 0
 
     @cached_property
     def ground(self) -> Ground | None:
@@ -256,7 +257,7 @@ class Walk:
 
 def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     """Simulate the champion on the creature's ground, without noise or pushes."""
-    task = how_simulated(champion.task, champion.wish)
+    task = task_rules(champion.task, champion.wish)
     start = task.aimed(nominal_starts(creature, 1), CertificateConfig())
     outcome = simulate(creature, champion, start, seconds, record=1, threads=1)
     film, fell = outcome.trajectory, float(outcome.fell[0])

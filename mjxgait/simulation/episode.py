@@ -14,7 +14,7 @@ from mjxgait.types import BodyState, Sensed, pytree
 
 @pytree
 class Late:
-    """Delayed torques. delay: [] control steps. recent: [D, J], newest first."""
+    """Delayed torques. delay: [] control steps. recent: [D = rollout.latency, J], newest first."""
 
     delay: jax.Array
     recent: jax.Array
@@ -24,13 +24,13 @@ class Late:
 class Lane:
     """One simulation in flight.
 
-    job: [] place in the device's queue. plan, memory: the controller's. stats, goal, params: the
+    place: [] in the device's queue. plan, memory: the controller's. stats, goal, params: the
     task's. rules: the drive's. push as in `Starts`.
     command: [J] the controller's latest; None where the controller acts in every step.
     late: None where torques are never delayed.
     """
 
-    job: jax.Array
+    place: jax.Array
     body: BodyState
     plan: object
     memory: object
@@ -53,7 +53,7 @@ def first_body(start: Starts) -> BodyState:
         warmstart=still,
         constraint_force=still,
         friction=start.friction,
-        parameters=start.numbers,
+        parameters=start.parameters,
         ground=start.ground,
     )
 

@@ -34,7 +34,7 @@ class Evaluator(Protocol):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Local:
+class LocalEvaluator:
     """Evaluator on this machine's devices, as a part of the program that calls it."""
 
     simulator: Simulator
@@ -56,12 +56,12 @@ class Local:
 
         def of_row(row: tuple[Config, EpisodeStats, jax.Array]) -> Evaluation:
             settings, stats, computed = row
-            return self.verdict(settings, Episodes(stats, computed))
+            return self.evaluation_of(settings, Episodes(stats, computed))
 
         evaluation = jax.lax.map(of_row, (settings, episodes.stats, computed))
         return evaluation if requested is None else completed(evaluation, requested)
 
-    def verdict(self, settings: Config, episodes: Episodes) -> Evaluation:
+    def evaluation_of(self, settings: Config, episodes: Episodes) -> Evaluation:
         """Return the results of one row's episodes, statistics with leaves [N, R, ...]."""
         task, stats = self.simulator.task, episodes.stats
 

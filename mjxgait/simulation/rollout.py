@@ -56,7 +56,7 @@ class Episodes:
 class Simulator:
     """Static part of the episodes of one creature.
 
-    steps: T per episode. lanes: L per device. mesh: the devices. bodies: maps a genome and a start
+    steps: T per episode. lanes: L per device. mesh: the devices. grow: maps a genome and a start
     to that start with the genome's own body; None where all have the plant's.
     """
 
@@ -68,7 +68,7 @@ class Simulator:
     steps: int
     lanes: int
     mesh: Mesh
-    bodies: Callable[[object, Starts], Starts] | None = None
+    grow: Callable[[object, Starts], Starts] | None = None
 
     def simulate(
         self, genomes: object, starts: Starts, settings: Config, wanted: jax.Array | None = None
@@ -92,10 +92,10 @@ class Simulator:
         plans = jax.vmap(jax.vmap(self.controller.prepare, (0, None)))(genomes, settings.controller)
         turns = self._turns(plans, shape, wanted)
         padding = jnp.arange(total, len(dealt), dtype=jnp.int32)
-        jobs = dealt if turns is None else jnp.concatenate([turns, padding])[dealt]
+        queued = dealt if turns is None else jnp.concatenate([turns, padding])[dealt]
         if wanted is not None:
-            jobs = jnp.where(dealt < jnp.sum(wanted), jobs, total)
-        stats, computed = run(jobs, plans, starts, settings, self._own_starts(genomes, starts))
+            queued = jnp.where(dealt < jnp.sum(wanted), queued, total)
+        stats, computed = run(queued, plans, starts, settings, self._own_starts(genomes, starts))
 
         def in_order(leaf: jax.Array) -> jax.Array:
             by_device = leaf.reshape(devices, queue, *leaf.shape[1:])
@@ -121,14 +121,14 @@ class Simulator:
 
     def _own_starts(self, genomes: object, starts: Starts) -> Starts | None:
         """Return each genome's own starts [B, N, R, ...]; None where all bodies are the plant's."""
-        if self.bodies is None:
+        if self.grow is None:
             return None
-        each = jax.vmap(jax.vmap(self.bodies, (None, 0)), (0, None))
+        each = jax.vmap(jax.vmap(self.grow, (None, 0)), (0, None))
         return jax.vmap(each)(genomes, starts)
 
     def _run_queue(
         self,
-        jobs: jax.Array,
+        episodes: jax.Array,
         plans: object,
         starts: Starts,
         settings: Config,
@@ -136,18 +136,21 @@ class Simulator:
         *,
         total: int,
     ) -> tuple[EpisodeStats, jax.Array]:
-        """Run one device's queue of jobs [Q].
+        """Run one device's queue of episodes [Q].
 
         Return the statistics, leaves [Q, ...], and the computed steps [1].
+
+        episodes: numbers over (row, individual, start), the start fastest; those of at least
+        `total` are padding and come last.
         """
-        queue = jobs.shape[0]
+        queue = episodes.shape[0]
         lanes = min(self.lanes, queue)
-        waiting = jnp.sum(jobs < total)
+        waiting = jnp.sum(episodes < total)
 
         def fresh(places: jax.Array) -> Lane:
-            job = jnp.where(places < waiting, places, queue)
+            place = jnp.where(places < waiting, places, queue)
             lane = jax.vmap(partial(self._fresh_lane, plans, starts, settings, own))(
-                job, jobs[jnp.minimum(places, queue - 1)]
+                place, episodes[jnp.minimum(places, queue - 1)]
             )
             return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
 
@@ -158,7 +161,7 @@ class Simulator:
             lane = jax.lax.fori_loop(0, CHECK_EVERY, self._step, lane)
             lane = self._look_for_overlap(lane)
             done = (lane.stats.steps >= self.steps) | (lane.stats.reason != Reason.FINISHED)
-            results = self._stored(results, jnp.where(done, lane.job, queue), lane.stats)
+            results = self._stored(results, jnp.where(done, lane.place, queue), lane.stats)
             lane = self._per_lane(choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
             return lane, results, taken + jnp.sum(done), rounds + 1
 
@@ -172,7 +175,7 @@ class Simulator:
             0,
             self._most_rounds(queue, lanes),
             lambda _, carry: jax.lax.cond(
-                jnp.any(carry[0].job < queue), body, lambda same: same, carry
+                jnp.any(carry[0].place < queue), body, lambda same: same, carry
             ),
             carry,
         )
@@ -189,7 +192,7 @@ class Simulator:
         )
 
     def _most_rounds(self, queue: int, lanes: int) -> int:
-        """Rounds that suffice for a queue: a free lane always takes a job (Graham 1966)."""
+        """Rounds that suffice for a queue: a free lane always takes an episode (Graham 1966)."""
         longest = -(-self.steps // CHECK_EVERY) + 1
         return -(-queue * longest // lanes) + longest
 
@@ -199,12 +202,12 @@ class Simulator:
         starts: Starts,
         settings: Config,
         own: Starts | None,
-        job: jax.Array,
+        place: jax.Array,
         episode: jax.Array,
     ) -> Lane:
         """Return the lane at the start of an episode.
 
-        episode: [] number over (row, individual, start), the start fastest. plans: leaves [B, N,
+        place: [] in the queue. episode: [] its number, see `_run_queue`. plans: leaves [B, N,
         ...], the controller's. own: each genome's own starts, if any.
         """
         count, individuals = starts.friction.shape[1], jax.tree.leaves(plans)[0].shape[1]
@@ -214,7 +217,7 @@ class Simulator:
         mine = jax.tree.map(lambda leaf: leaf[row], settings)
         joints = len(self.creature.joints.names)
         return Lane(
-            job=job,
+            place=place,
             body=first_body(start),
             plan=jax.tree.map(lambda leaf: leaf[row, individual], plans),
             memory=self.controller.init(),
@@ -247,7 +250,7 @@ class Simulator:
         late = lane.late
         if late is not None:
             torque, late = self._per_lane(arriving)(late, lane.stats.steps, torque)
-        stats = self._per_lane(self._evaluate)(lane, sensed, torque)
+        stats = self._per_lane(self._updated_stats)(lane, sensed, torque)
         body = self.plant.advance(body, step_data, self._per_lane(self.drive.lift)(torque))
         goal = self._per_lane(self.task.next_goal)(lane.goal, sensed)
         kept = command if self._holds else None
@@ -278,7 +281,7 @@ class Simulator:
         depth = self.plant.overlap(lane.body)
         return dataclasses.replace(lane, stats=deepened(lane.stats, depth, self.steps))
 
-    def _evaluate(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
+    def _updated_stats(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> EpisodeStats:
         """Update the statistics after a step, unless the episode has ended."""
         stats, going = lane.stats, is_going(lane.stats, self.steps)
         reason = reason_of(self.task, sensed, lane.goal)

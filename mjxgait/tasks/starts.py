@@ -32,7 +32,8 @@ class Starts:
     push: [R, nv] added to qvel at step push_step [R] (never when it is `NEVER`).
     stiffness, damping: [R, J] factors on the joints' kp and kd.
     mass_scale: [R, nbody - 1] factors on the parts' masses and inertias; None if all are 1.
-    numbers: leaves [R, ...], the body parameters that follow from it, as the plant reads them.
+    parameters: leaves [R, ...], those of each trial's own body (from mass_scale, evolved sizes or
+      growth), as the plant reads them; None where the plant's own apply.
     ground: leaves [R, ...], one per trial, a `Ground`, or the `Medium` of modular bodies; None if
       all are flat.
     goal: leaves [R, ...], what the task adds to a trial, as its `Task.goal` reads it; None if it
@@ -49,15 +50,16 @@ class Starts:
     damping: jax.Array
     ground: Any = None
     mass_scale: jax.Array | None = None
-    numbers: object = None
+    parameters: object = None
     goal: Any = None
     delay: jax.Array | None = None
 
 
 @pytree
 class _Spread:
-    """What the drawn numbers are scaled by: the numbers of a config and a creature as inputs, so
-    that all of one shape share a program.
+    """Scales of the drawn numbers.
+
+    Those of config and creature are inputs, so that all of one shape share a program.
 
     standing: [nq]. qpos, dofs: [J] addresses of the joints. level: [2, nv] horizontal motion.
     angle: rad. rate: rad/s. friction: [2]. speed: m/s. moment: [2] steps.

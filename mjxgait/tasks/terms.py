@@ -74,7 +74,7 @@ The limit keeps an overlap from costing more than a walk earns.
 """
 
 
-def crossed(creature: Body, overlap: jax.Array) -> jax.Array:
+def overlap_cost(creature: Body, overlap: jax.Array) -> jax.Array:
     """Cost of an overlap, 0 to 1. overlap: [] m, the deepest."""
     deeper = jnp.maximum(overlap / creature.frame.hip_height - TOUCHING, 0.0)
     return deeper / (deeper + DEEP)

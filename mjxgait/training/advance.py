@@ -48,7 +48,7 @@ class Generations:
         genomes = jax.device_get(self.states.genomes)
         return [
             metrics_line(row_of(metrics, row), seconds, one.simulator.task)
-            | followed(one.simulator.controller.numbers(row_of(genomes, row)))
+            | followed(one.simulator.controller.genome_statistics(row_of(genomes, row)))
             for row, one in enumerate(self._batch.experiments)
         ]
 
@@ -74,10 +74,10 @@ def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> Line
     return finite | {name: found.tolist() for name, found in parents.items() if found is not None}
 
 
-def followed(numbers: Mapping[str, np.ndarray]) -> dict[str, float]:
+def followed(statistics: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Return best and mean of each quantity [P] of a population that is sorted, best first."""
-    best = {f"{name}_best": float(values[0]) for name, values in numbers.items()}
-    return best | {f"{name}_mean": float(values.mean()) for name, values in numbers.items()}
+    best = {f"{name}_best": float(values[0]) for name, values in statistics.items()}
+    return best | {f"{name}_mean": float(values.mean()) for name, values in statistics.items()}
 
 
 def _named(kind: str, names: Sequence[str], values: jax.Array) -> dict[str, float]:

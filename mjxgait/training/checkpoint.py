@@ -258,13 +258,13 @@ class Checkpoints:
 def _keep_threads_quiet() -> None:
     """Suppress output of Orbax's threads that repeats raised errors or advises programmers."""
     log = logging.getLogger("absl")
-    if _told_to_the_caller not in log.filters:
-        log.addFilter(_told_to_the_caller)
+    if _is_not_raised not in log.filters:
+        log.addFilter(_is_not_raised)
     if not isinstance(sys.unraisablehook, _WithoutClosedLoops):
         sys.unraisablehook = _WithoutClosedLoops(sys.unraisablehook)
 
 
-def _told_to_the_caller(record: logging.LogRecord) -> bool:
+def _is_not_raised(record: logging.LogRecord) -> bool:
     """Return False for Orbax's warnings, and its log records of errors that are also raised.
 
     On slow disks it warns that a write waits for the previous one; users can do nothing about it.

@@ -17,7 +17,7 @@ from mjxgait.certification import (
 )
 from mjxgait.certification.acceptance import acceptance_of, promising
 from mjxgait.certification.stress import Stress, StressConfig, stress
-from mjxgait.certification.trials import own
+from mjxgait.certification.trials import own_draw
 from mjxgait.champion import Champion
 from mjxgait.config.schema import ExaminationConfig
 from mjxgait.errors import listed
@@ -168,7 +168,10 @@ class Examiner:
         """
         if not self._goes_anywhere:
             return True
-        body, draw = champion.embodied(self.experiment.creature), own(champion, CertificateConfig())
+        body, draw = (
+            champion.embodied(self.experiment.creature),
+            own_draw(champion, CertificateConfig()),
+        )
         return stress(body, champion, REHEARSAL, hasty=True, draw=draw).passed
 
     @property

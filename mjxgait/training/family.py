@@ -5,24 +5,25 @@ are in `metrics.jsonl`. Evolution reads neither.
 """
 
 import dataclasses
-import io
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from mjxgait.evolution.state import EvolutionState
-from mjxgait.files import DamagedFile, read_bytes, write_bytes
+from mjxgait.files import DamagedFile
 from mjxgait.training.disk import disk_errors
+from mjxgait.training.npz import read_arrays, write_arrays
 from mjxgait.types import by_name
 
 FAMILY = "family"
 """Folder in a run."""
-BODY = "graph."
+GRAPH_PREFIX = "graph."
 """Beginning of the names of the arrays that a body grows from."""
-MOST = 100_000_000
-"""Largest size of a file in bytes."""
+OF_EACH = {"places", "origin", "fitness"}
+"""Names of the arrays [n] of a file besides those of the bodies."""
+MAX_BYTES = 100_000_000
+"""Largest size of a file's arrays in bytes."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ def newborns_of(state: EvolutionState) -> Newborns | None:
 
     The first population, and each that a run draws anew, counts as born.
     """
-    bodies = {n: a for n, a in by_name(state.genomes).items() if n.startswith(BODY)}
+    bodies = {n: a for n, a in by_name(state.genomes).items() if n.startswith(GRAPH_PREFIX)}
     if not bodies:
         return None
     (born,) = np.nonzero(np.asarray(state.born) == int(state.generation))
@@ -65,13 +66,11 @@ def keep_newborns(run: Path, state: EvolutionState) -> None:
     found = newborns_of(state)
     if found is None:
         return
-    data = io.BytesIO()
     given = {"places": found.places, "origin": found.origin, "fitness": found.fitness}
-    np.savez_compressed(data, allow_pickle=False, **given, **found.bodies)
     folder = run / FAMILY
     with disk_errors(folder):
         folder.mkdir(exist_ok=True)
-        write_bytes(_file(run, int(state.generation)), data.getvalue())
+        write_arrays(_file(run, int(state.generation)), {**given, **found.bodies})
 
 
 def drop_newborns(run: Path, generation: int) -> None:
@@ -91,18 +90,14 @@ def read_newborns(run: Path, generation: int) -> Newborns | None:
     if not path.exists():
         return None
     try:
-        with np.load(io.BytesIO(read_bytes(path, MOST)), allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        bodies = {name: array for name, array in arrays.items() if name.startswith(BODY)}
-        found = Newborns(arrays["places"], arrays["origin"], arrays["fitness"], bodies)
-    except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise DamagedFile(
-            f"{path}: damaged ({error}); delete it, and the tree ends there"
-        ) from None
-    lengths = {len(array) for array in arrays.values()}
-    if not bodies or len(lengths) != 1:
+        arrays = read_arrays(path, MAX_BYTES)
+    except DamagedFile as error:
+        raise DamagedFile(f"{error}; delete it, and the tree ends there") from None
+    bodies = {name: array for name, array in arrays.items() if name.startswith(GRAPH_PREFIX)}
+    lengths = {array.shape[:1] for array in arrays.values()}
+    if not bodies or not arrays.keys() >= OF_EACH or len(lengths) != 1:
         raise DamagedFile(f"{path}: its arrays do not fit each other; delete it")
-    return found
+    return Newborns(**{name: arrays[name] for name in OF_EACH}, bodies=bodies)
 
 
 def _file(run: Path, generation: int) -> Path:

@@ -14,14 +14,9 @@ import numpy as np
 
 from mjxgait.config.schema import Config
 from mjxgait.evolution.evolution import Evolution
-from mjxgait.evolution.state import (
-    NO_PARENT,
-    EvolutionState,
-    GenerationMetrics,
-    Proposal,
-    begun_anew,
-)
-from mjxgait.simulation.evaluator import Local
+from mjxgait.evolution.forced import with_stagnation_reset
+from mjxgait.evolution.state import NO_PARENT, EvolutionState, GenerationMetrics, Proposal
+from mjxgait.simulation.evaluator import LocalEvaluator
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.base import Task, in_order
 from mjxgait.tasks.starts import Starts
@@ -125,7 +120,7 @@ def evaluate(
     requested: RequestedTrials | None = None,
 ) -> Evaluation:
     """Evaluate genomes [B, N, ...] on this machine."""
-    return Local(spec.simulator(numbers)).evaluate(genomes, starts, settings, requested)
+    return LocalEvaluator(spec.simulator(numbers)).evaluate(genomes, starts, settings, requested)
 
 
 def first_trials(states: EvolutionState, proposals: Proposal) -> RequestedTrials:
@@ -178,13 +173,13 @@ def absorb(
     ) -> tuple[EvolutionState, GenerationMetrics]:
         row, state, proposal, evaluation = given
         after, logged = evolution_of(simulator, row.settings).absorb(state, proposal, evaluation)
-        after = climbed(simulator.task, row.settings.fitness, after)
+        after = with_level_raised(simulator.task, row.settings.fitness, after)
         return after, dataclasses.replace(logged, level=after.level)
 
     return jax.lax.map(of_row, (rows, states, proposals, evaluation))
 
 
-def climbed(task: Task, settings: object, state: EvolutionState) -> EvolutionState:
+def with_level_raised(task: Task, settings: object, state: EvolutionState) -> EvolutionState:
     """Raise the curriculum level after a generation if most of the best have passed it.
 
     The old level was easier, so fitness at that level is then discarded: all survivors are
@@ -197,7 +192,7 @@ def climbed(task: Task, settings: object, state: EvolutionState) -> EvolutionSta
     ready = jnp.mean(jax.vmap(task.level_passed)(best) & known) > 0.5
     higher = ready & (state.level < task.levels(settings))
     rounds = None if state.rounds is None else jnp.where(higher, 0.0, state.rounds)
-    after = begun_anew(state, higher)
+    after = with_stagnation_reset(state, higher)
     return dataclasses.replace(after, level=state.level + higher, stale=higher, rounds=rounds)
 
 

@@ -12,7 +12,12 @@ from mjxgait.controllers.sims_brain.genotype import Capacity
 from mjxgait.controllers.sims_brain.operators import Genotype
 from mjxgait.controllers.sims_brain.opponent import acting, arena_of
 from mjxgait.controllers.sims_brain.phenotype import anatomy, body_of
-from mjxgait.controllers.sims_brain.reference_body import DRAG, FRICTION, GRAVITY, HARDEST
+from mjxgait.controllers.sims_brain.reference_body import (
+    CONTACT_TIME_CONSTANT,
+    DRAG,
+    FRICTION,
+    GRAVITY,
+)
 from mjxgait.creature import Creature
 from mjxgait.kinds import in_water, skills_of
 from mjxgait.physics.batched_trees.arena import ArenaPlant
@@ -42,7 +47,7 @@ class GraphGrowth(Growth[TreePlant, Genotype]):
         medium: Medium | None = start.ground
         rested = plant.rested(tree, qpos)
         qpos = rested if medium is None else jnp.where(medium.wet > 0, qpos, rested)
-        return dataclasses.replace(start, qpos=qpos, numbers=tree)
+        return dataclasses.replace(start, qpos=qpos, parameters=tree)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +59,7 @@ class ArenaGrowth(Growth[ArenaPlant, Genotype]):
     def body(self, plant: ArenaPlant, genome: Genotype, start: Starts) -> Starts:
         """Return the start with the body, its opponent and the cube."""
         tree, qpos, arena = arena_of(plant.one, self.controller, genome, start.qpos)
-        return dataclasses.replace(start, qpos=qpos, numbers=tree, ground=arena)
+        return dataclasses.replace(start, qpos=qpos, parameters=tree, ground=arena)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -94,7 +99,7 @@ class GrownSpec:
         around = Surroundings(
             step=step,
             friction=FRICTION,
-            contact=HARDEST * step,
+            contact=CONTACT_TIME_CONSTANT * step,
             floor=False in media,
             gravity=GRAVITY if False in media else 0.0,
             drag=DRAG if True in media else 0.0,

@@ -4,8 +4,6 @@ The new run keeps it in its folder, so that it begins again without the earlier 
 """
 
 import dataclasses
-import io
-import zipfile
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 
@@ -16,11 +14,12 @@ import numpy as np
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState
-from mjxgait.files import DamagedFile, read_bytes, write_bytes
+from mjxgait.files import DamagedFile
 from mjxgait.training.checkpoint import first_difference
 from mjxgait.training.disk import disk_errors
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import open_run
+from mjxgait.training.npz import read_arrays, write_arrays
 from mjxgait.training.stored import read_stored, stored_generations
 from mjxgait.types import by_name
 
@@ -28,8 +27,8 @@ INITIAL = "initial.npz"
 """File in a run folder: the arrays [N, ...] of these genomes by dotted name. Those that the earlier
 task did not use are missing and stay as drawn."""
 GENOMES = "genomes."
-MOST = 1_000_000_000
-"""Largest size of the file in bytes."""
+MAX_BYTES = 1_000_000_000
+"""Largest size of the arrays in bytes."""
 
 Genomes = Mapping[str, np.ndarray]
 Shapes = dict[str, tuple[int, ...]]
@@ -138,10 +137,8 @@ def has_begun(folder: Path) -> bool:
 
 def keep_initial(folder: Path, initial: Initial) -> None:
     """Write the genomes into a run folder."""
-    data = io.BytesIO()
-    np.savez_compressed(data, allow_pickle=False, **initial.genomes)
     with disk_errors(folder):
-        write_bytes(folder / INITIAL, data.getvalue())
+        write_arrays(folder / INITIAL, initial.genomes)
 
 
 def read_initial(folder: Path) -> Genomes | None:
@@ -151,13 +148,7 @@ def read_initial(folder: Path) -> Genomes | None:
       UserError: the file is damaged.
     """
     path = folder / INITIAL
-    if not path.exists():
-        return None
-    try:
-        with np.load(io.BytesIO(read_bytes(path, MOST)), allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise DamagedFile(f"{path}: damaged ({error})") from None
+    return read_arrays(path, MAX_BYTES) if path.exists() else None
 
 
 def planted(state: EvolutionState, genomes: Genomes, controller: object = None) -> EvolutionState:

@@ -22,7 +22,7 @@ from mjxgait.training.stages import compiled
 
 OTHER = 1_000_000
 """Added to a run's seed, for other starts than those of its generations."""
-HARDEST = 10**6
+TOP_LEVEL = 10**6
 """Curriculum level above any task's highest, so that trials are as hard as they become."""
 
 
@@ -99,7 +99,7 @@ class Prescreen:
         row, task = self._trials.row, self._trials.simulator.task
         starts = row.starts
         if task.has_curriculum:
-            starts = task.at_level(starts, row.settings.fitness, jnp.int32(HARDEST))
+            starts = task.at_level(starts, row.settings.fitness, jnp.int32(TOP_LEVEL))
         return jax.tree.map(lambda leaf: leaf[None], starts)
 
     @cached_property

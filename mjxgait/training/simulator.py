@@ -91,5 +91,5 @@ def assembled(
         steps=max(round(rollout.seconds / step), 1),
         lanes=rollout.lanes or lanes,
         mesh=Mesh(np.array(jax.devices()), (AXIS,)),
-        bodies=None if growth is None else partial(growth.body, plant),
+        grow=None if growth is None else partial(growth.body, plant),
     )

@@ -42,7 +42,9 @@ class SizeGrowth(Growth[ModelPlant, Bodied]):
             one = plant.with_mass_scale(one, start.mass_scale)
         rises = known.upwards.astype(np.float32)
         qpos = start.qpos + self._lift(factors) * rises
-        return dataclasses.replace(start, qpos=qpos, numbers=plant.with_length_scale(one, factors))
+        return dataclasses.replace(
+            start, qpos=qpos, parameters=plant.with_length_scale(one, factors)
+        )
 
     def _lift(self, factors: jax.Array) -> jax.Array:
         """Return the rise [] of the trunk in m with these factors [B]."""
@@ -96,7 +98,7 @@ class ModelSpec:
             return starts
         one, with_mass_scale = self.plant.parameters, self.plant.with_mass_scale
         every = jax.vmap(lambda factors: with_mass_scale(one, factors))
-        return dataclasses.replace(starts, numbers=every(starts.mass_scale))
+        return dataclasses.replace(starts, parameters=every(starts.mass_scale))
 
     def simulator(self, numbers: BodyParams | None = None) -> Simulator:
         """Return the simulator of the creature, or of the body with these parameters."""

@@ -113,7 +113,7 @@ class CompiledGeneration:
         """Run a generation of the rows [B]. evaluator: replaces this machine's program."""
         proposals, starts = self.propose(numbers, rows, states)
 
-        def verdict(*requested: RequestedTrials) -> Evaluation:
+        def evaluated(*requested: RequestedTrials) -> Evaluation:
             if evaluator is not None:
                 return evaluator.evaluate(proposals.offspring, starts, rows.settings, *requested)
             assert self.evaluate is not None, "compiled for an evaluator elsewhere"
@@ -122,10 +122,10 @@ class CompiledGeneration:
             return found
 
         if self.promote is None:
-            evaluation = verdict()
+            evaluation = evaluated()
         else:
-            first = verdict(first_trials(states, proposals))
-            evaluation = verdict(self.promote(numbers, rows, states, proposals, first))
+            first = evaluated(first_trials(states, proposals))
+            evaluation = evaluated(self.promote(numbers, rows, states, proposals, first))
         after: tuple[EvolutionState, GenerationMetrics] = self.absorb(
             numbers, rows, states, proposals, evaluation
         )

@@ -100,7 +100,7 @@ class TensorBoard:
         self._latest = line["generation"]
 
     def _void_from(self, generation: int) -> None:
-        """Tell TensorBoard to forget what came before from this generation on."""
+        """Declare earlier events void from this generation on."""
         start = self._events.SessionLog(status=self._events.SessionLog.START)
         self._file.add_event(self._events.Event(step=generation, session_log=start))
 

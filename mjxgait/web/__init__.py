@@ -1,1 +1,1 @@
-"""Browser pages: one to share a walk, one to drive it, and one to watch a running evolution."""
+"""Browser pages: to share a walk, compare several, simulate one, drive a repertoire, follow a run."""

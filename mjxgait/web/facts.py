@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.acceptance import how_simulated
+from mjxgait.certification.acceptance import task_rules
 from mjxgait.champion import Champion, serializer_of
 from mjxgait.controllers.key_poses.config import gene_names
 from mjxgait.controllers.sims_brain.reference import (
@@ -50,7 +50,7 @@ def facts_of(creature: Creature, champion: Champion) -> Facts:
     """
     _check(creature, champion)
     model, frame, start = examined_model(creature), creature.frame, start_frame(creature)
-    task = how_simulated(champion.task, champion.wish)
+    task = task_rules(champion.task, champion.wish)
     fall = task.fall(CertificateConfig())
     aims = task.aimed(nominal_starts(creature, 1), CertificateConfig())
     reference = reference_of(creature, champion, float(model.opt.timestep))
@@ -78,7 +78,7 @@ def facts_of(creature: Creature, champion: Champion) -> Facts:
         "goal": float(aims.goal[0]),
         "bar": _bounded(aims.bar[0, 0]),
         "feet": _feet(creature, seen=any(name in FOOT_SENSES for name in reference.reads)),
-        "forbidden": _parts(model, creature.feet.seen[watched:]),
+        "forbidden": _parts(model, creature.feet.watched_ids[watched:]),
         "fall": {
             "min_up": fall.min_up,
             "height": _bounded(np.array(fall.height)),
@@ -99,7 +99,7 @@ def _check(creature: Creature, champion: Champion) -> None:
             f'the controller "{champion.controller}"; leave --physics out, and the page plays the '
             "recorded walk"
         )
-    if how_simulated(champion.task).next_goal(np.ones(1), np.ones(1), np.ones(1))[0] > 1:
+    if task_rules(champion.task).next_goal(np.ones(1), np.ones(1), np.ones(1))[0] > 1:
         raise UserError(
             f'{name}: a page with physics has one goal, and those of "{champion.task}" move on; '
             "leave --physics out"
@@ -183,7 +183,11 @@ def _feet(creature: Creature, seen: bool) -> Facts:
     return {
         "seen": seen,
         "parts": [
-            [part for part, of in zip(parts, creature.feet.geoms, strict=True) if of == foot]
+            [
+                part
+                for part, of in zip(parts, creature.feet.foot_of_geoms, strict=True)
+                if of == foot
+            ]
             for foot in range(len(creature.feet.names))
         ],
     }

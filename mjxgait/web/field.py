@@ -1,4 +1,5 @@
 """The best individuals of a run that may still learn, each simulated, side by side in a scene.
+
 The champion is the best of the latest generation, the others those of the latest checkpoint, so a
 training writes nothing more for them.
 """

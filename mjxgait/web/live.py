@@ -1,4 +1,5 @@
 """Local page that shows a run as it learns: its best individuals side by side, and the fitness.
+
 A separate process only reads the run folder, so it cannot disturb a training and works on a
 finished run as well. The browser plays the animation; the only cost here is one short simulation
 of each new individual that is shown.
@@ -36,7 +37,7 @@ CONNECTIONS, IDLE = 32, 10.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Shown:
+class Served:
     """Content of the page.
 
     version: grows with each new scene; 0 while there is none. scene: JSON; see `gallery.scene_of`.
@@ -54,7 +55,7 @@ class Watcher:
         self.run, self.trains = run, trains
         self.creature, _ = open_run(run)
         self.field = Field(run, self.creature)
-        self.shown = Shown(0, b"")
+        self.shown = Served(0, b"")
 
     def look(self) -> float:
         """Simulate a new individual, if any; return the time in s to wait before the next check."""
@@ -63,7 +64,7 @@ class Watcher:
         with contextlib.suppress(UserError):
             if self.field.advance():
                 scene = json.dumps(self.field.scene()).encode()
-                self.shown = Shown(self.shown.version + 1, scene)
+                self.shown = Served(self.shown.version + 1, scene)
         if self.trains or running(self.run):
             return max(PATIENCE, (time.process_time() - began) * (1 / SHARE - 1))
         return PATIENCE if self.field.idle else 0.0
@@ -162,20 +163,29 @@ def open_server(watcher: Watcher, port: int | None = None) -> ThreadingHTTPServe
     """Return a server, bound to this machine alone.
 
     Raises:
-      UserError: the port is taken.
+      UserError: the port is taken, or none that a server may have.
     """
 
     class Handler(_Handler):
         follows = watcher
 
-    for candidate in PORTS if port is None else [port]:
+    if port is not None:
+        if not 1 <= port <= 65535:
+            raise UserError(f"--port {port}: give a number from 1 to 65535")
+        try:
+            return _Server((HERE, port), Handler)
+        except OSError as error:
+            raise UserError(
+                f"--port {port}: cannot be used ({error.strerror}); name another"
+            ) from None
+    for candidate in PORTS:
         try:
             return _Server((HERE, candidate), Handler)
         except OSError:
             continue
     raise UserError(
-        f"port {port or f'{PORTS.start} to {PORTS.stop - 1}'}: taken by another program; name a "
-        "free one with --port"
+        f"ports {PORTS.start} to {PORTS.stop - 1}: taken by other programs; name a free one with "
+        "--port"
     )
 
 

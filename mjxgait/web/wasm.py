@@ -25,7 +25,7 @@ CHECKSUMS = {
     "mujoco.wasm": "2d380f1070a556c3003b4a7c7c10c98a5f61db4e91815de1075ec478e9487e76",
 }
 """SHA-256 of the two files that a page needs."""
-MOST = 100_000_000
+MAX_BYTES = 100_000_000
 """Largest size of a file in bytes."""
 PATIENCE = 300.0
 """s; npm waits for the network."""
@@ -65,7 +65,7 @@ def cache_folder() -> Path:
 
 def _read(folder: Path) -> Engine:
     """Return the build in a folder."""
-    found = {name: files.read_bytes(folder / name, MOST) for name in CHECKSUMS}
+    found = {name: files.read_bytes(folder / name, MAX_BYTES) for name in CHECKSUMS}
     _check(found, folder)
     return Engine(found["mujoco.js"].decode("utf-8"), found["mujoco.wasm"])
 
@@ -128,5 +128,5 @@ def _unpacked(archive: Path) -> dict[str, bytes]:
     with contextlib.suppress(tarfile.TarError, KeyError, EOFError), tarfile.open(archive) as packed:
         for name in found:
             if member := packed.extractfile(f"package/{name}"):
-                found[name] = member.read(MOST)
+                found[name] = member.read(MAX_BYTES)
     return found

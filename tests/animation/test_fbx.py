@@ -28,7 +28,7 @@ from mjxgait.animation.export import export_glb, export_onto, read_character
 from mjxgait.animation.keys import bring
 from mjxgait.cli import doctor
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.processes import safe_environment
@@ -151,7 +151,7 @@ def test_a_run_of_an_fbx_file_is_put_onto_it_and_the_file_stays(
 ):
     """By itself, as a walk of a GLB file is; the copying Blender writes the character back."""
     folder = copying.parent
-    creature = load_files(import_model(copying, ImportChoices(apart=False)).files)
+    creature = creature_of(import_model(copying, ImportChoices(apart=False)).files)
     assert creature.settings.rig.file == "dog.fbx"
     run = write_run(folder / "run", creature, treading(creature, degrees=6.0))
     for name in ("walk.glb", "walk.fbx"):
@@ -193,7 +193,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def creatures(made: Path) -> dict[str, Creature]:
     return {
-        kind: load_files(import_model(made / f"{kind}.fbx", ImportChoices(apart=False)).files)
+        kind: creature_of(import_model(made / f"{kind}.fbx", ImportChoices(apart=False)).files)
         for kind in ("cm", "m")
     }
 

@@ -21,7 +21,7 @@ from mjxgait.animation.export import WalkLoop, export_onto, read_character, stan
 from mjxgait.animation.export.footfalls import footfalls, stances
 from mjxgait.animation.export.onto import build_onto
 from mjxgait.animation.keys import bring
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.experiments.repertoire.clips import CLIPS, TABLE, write_clips
 from mjxgait.importer import ImportChoices, import_model
 
@@ -52,7 +52,7 @@ def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     file.write_bytes(styled(data, armature, BY_MATRIX[request.param]))
     height = 1.2 if request.param == "of metres" else None
     files = import_model(file, ImportChoices(apart=False, height=height)).files
-    loop = treading_loop(load_files(files))
+    loop = treading_loop(creature_of(files))
     return Case(file, loop, armature @ np.diag([100.0, 100.0, 100.0, 1.0]))
 
 
@@ -283,7 +283,7 @@ def test_a_character_twice_as_large_takes_longer_steps(case: Case, tmp_path: Pat
 def loop_of_bvh(tmp_path_factory: pytest.TempPathFactory) -> WalkLoop:
     file = tmp_path_factory.mktemp("skeleton") / "dog.bvh"
     file.write_text(bvh())
-    return treading_loop(load_files(import_model(file, ImportChoices(apart=False)).files))
+    return treading_loop(creature_of(import_model(file, ImportChoices(apart=False)).files))
 
 
 def test_a_skeleton_of_bvh_walks_on_the_same_character(case: Case, loop_of_bvh: WalkLoop):

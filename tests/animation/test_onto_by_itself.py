@@ -11,7 +11,8 @@ from rendering.made_up import treading, write_run
 
 import mjxgait
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.scale import load_files, scaled
+from mjxgait.creature.load import creature_of
+from mjxgait.creature.scale import scaled
 from mjxgait.importer import ImportChoices, import_model
 
 CAPSULES = "shows the body of capsules"
@@ -35,7 +36,7 @@ def project(
     file = tmp_path / "dog.glb"
     file.write_bytes(glb())
     files = {name: text.replace(str(folder), str(tmp_path)) for name, text in files.items()}
-    write_walk(tmp_path / "runs" / "dog", load_files(files))
+    write_walk(tmp_path / "runs" / "dog", creature_of(files))
     (tmp_path / "empty").mkdir()
     monkeypatch.chdir(tmp_path / "empty")
     return tmp_path
@@ -155,9 +156,9 @@ def test_where_the_file_lies_changes_no_creature(
     other.write_bytes(glb())
     again = import_model(other, ImportChoices(apart=False)).files
     assert again["character.toml"] != files["character.toml"]
-    assert load_files(again).digest == load_files(files).digest
+    assert creature_of(again).digest == creature_of(files).digest
     plain = {name: text for name, text in files.items() if name != "character.toml"}
-    assert load_files(plain).digest == load_files(files).digest
+    assert creature_of(plain).digest == creature_of(files).digest
     skeleton = tmp_path / "dog.bvh"
     skeleton.write_text(bvh())
     assert "character.toml" not in import_model(skeleton, ImportChoices(apart=False)).files

@@ -14,7 +14,7 @@ from importer.rigs import DOG, Bone, glb
 from importer.test_arms import FIGURE
 
 from mjxgait.animation.export import WalkLoop, build_onto, read_character
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.importer import ImportChoices, import_model
 
 BEAR: dict[str, Bone] = {
@@ -90,7 +90,7 @@ def shown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     drawn = DRAWN[request.param]
     file = tmp_path_factory.mktemp("floor") / "character.glb"
     file.write_bytes(glb(drawn.bones, soles=True, paws=drawn.paws))
-    creature = load_files(import_model(file, ImportChoices(apart=False)).files)
+    creature = creature_of(import_model(file, ImportChoices(apart=False)).files)
     return shown_in(file, treading_loop(creature), drawn)
 
 

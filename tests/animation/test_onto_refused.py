@@ -17,7 +17,8 @@ from rendering.made_up import treading, write_run
 from mjxgait.animation.export import WalkLoop, read_character
 from mjxgait.animation.export.onto import build_onto
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import load_files, scaled
+from mjxgait.creature.load import creature_of
+from mjxgait.creature.scale import scaled
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 
@@ -26,7 +27,7 @@ from mjxgait.importer import ImportChoices, import_model
 def dog(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, WalkLoop]:
     file = tmp_path_factory.mktemp("dog") / "dog.glb"
     file.write_bytes(glb())
-    return file, treading_loop(load_files(import_model(file, ImportChoices(apart=False)).files))
+    return file, treading_loop(creature_of(import_model(file, ImportChoices(apart=False)).files))
 
 
 def refused(loop: WalkLoop, file: Path) -> str:
@@ -91,13 +92,13 @@ def test_a_body_that_no_file_has_is_refused(dog: tuple[Path, WalkLoop], stool: C
         text.index(f"[{table}]") for table in ("rig", "steering", "stepping", "termination")
     )
     old = text[:rig] + text[after:step] + text[end:]  # it had none of these tables
-    earlier = load_files({**creature.files, "creature.toml": old})
+    earlier = creature_of({**creature.files, "creature.toml": old})
     assert "import the character again" in refused(of(earlier), file)
     longer = scaled(creature, {"LeftShin": 1.5, "RightShin": 1.5})
     assert "of the hip height off the parts" in refused(of(longer), file)
     wrong = text.replace('"Tail" = "Tail"', '"Tall" = "Tail"')
     with pytest.raises(UserError, match=r'rig\.bones = "Tall" is not in creature\.xml'):
-        load_files({**creature.files, "creature.toml": wrong})
+        creature_of({**creature.files, "creature.toml": wrong})
 
 
 def test_the_command_writes_beside_the_character_and_never_over_it(

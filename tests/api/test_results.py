@@ -69,12 +69,14 @@ def test_python_and_the_command_line_ask_for_the_same_repertoire(
 ):
     asked: list[repertoires.RepertoireRequest] = []
 
-    def gather(request: repertoires.RepertoireRequest, output: Output) -> tuple[Path, bool]:
+    def evolve_repertoire(
+        request: repertoires.RepertoireRequest, output: Output
+    ) -> tuple[Path, bool]:
         asked.append(request)
         return tmp_path, True
 
-    monkeypatch.setattr(repertoires, "gather", gather)
-    monkeypatch.setattr(repertoire, "gather", gather)
+    monkeypatch.setattr(repertoires, "evolve_repertoire", evolve_repertoire)
+    monkeypatch.setattr(repertoire, "evolve_repertoire", evolve_repertoire)
     chosen = {"speeds": ("0.2", "0.4"), "turns": (5.0,), "gait": "trot", "seed": 3}
     assert mjxgait.repertoire("duck", out="set", blends=False, quiet=True, **chosen) == tmp_path
     words = "repertoire duck --out set --speeds 0.2 0.4 --turns 5 --gait trot --seed 3 --no-blends"

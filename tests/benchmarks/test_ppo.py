@@ -15,7 +15,7 @@ from mjxgait.creature import Creature
 from mjxgait.environments.functional import make_environment
 from mjxgait.environments.problem import make_problem
 from mjxgait.evolution.chance import key_of
-from mjxgait.simulation.evaluator import Local
+from mjxgait.simulation.evaluator import LocalEvaluator
 from mjxgait.tasks.base import in_order
 from mjxgait.tasks.terms import score
 from mjxgait.training.experiment import build_experiment
@@ -33,7 +33,9 @@ def test_an_episode_in_the_environment_is_the_controllers_in_the_simulator(stool
     experiment = build_experiment(stool, config)
     genomes = jax.tree.map(lambda leaf: leaf[:2], experiment.init().genomes)
     simulated = jax.jit(experiment.simulate)(genomes, experiment.starts)
-    judged = jax.jit(Local(experiment.simulator).verdict)(experiment.row.settings, simulated)
+    judged = jax.jit(LocalEvaluator(experiment.simulator).evaluation_of)(
+        experiment.row.settings, simulated
+    )
     task, last = experiment.simulator.task, config.evolution.generations
     weights = in_order(task.weights(experiment.row.settings.fitness, last), task.terms)
     wanted = score(judged.terms[:, :, None], weights, 0.5)

@@ -96,17 +96,17 @@ def test_every_champion_is_examined_on_its_own_draw(tiny, trotter):
     mine, again, others, common = (
         trials.starts(tiny, config, draw, 8).joint_offset
         for draw in (
-            trials.own(trotter, config),
-            trials.own(dataclasses.replace(trotter, fitness=3.0, origin={"seed": 4}), config),
-            trials.own(other, config),
-            trials.common(config),
+            trials.own_draw(trotter, config),
+            trials.own_draw(dataclasses.replace(trotter, fitness=3.0, origin={"seed": 4}), config),
+            trials.own_draw(other, config),
+            trials.common_draw(config),
         )
     )
     np.testing.assert_array_equal(mine, again)
     for draw in (others, common):
         assert not np.isin(mine, draw).any()
     reseeded = dataclasses.replace(config, seed=1)
-    for draw in (trials.own(trotter, reseeded), trials.common(reseeded)):
+    for draw in (trials.own_draw(trotter, reseeded), trials.common_draw(reseeded)):
         assert not np.isin(trials.pushes(tiny, config, draw, 8).push_time, common).any()
         assert not np.isin(trials.starts(tiny, config, draw, 8).joint_offset, (mine, common)).any()
 

@@ -13,7 +13,7 @@ from mjxgait.champion import read_champion, write_champion
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import build
 from mjxgait.creature import load_creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.errors import UserError
 from mjxgait.training import folder
 from mjxgait.training.folder import create_run
@@ -149,7 +149,7 @@ def test_the_extreme_sizes_of_a_body_are_checked_before_training(tiny, tmp_path,
 
 
 def test_impossible_sizes_leave_no_folder(tiny, tmp_path):
-    nameless = load_files(
+    nameless = creature_of(
         {
             **tiny.files,
             "creature.xml": tiny.files["creature.xml"].replace(' name="hind_left_lower"', ""),

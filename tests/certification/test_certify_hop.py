@@ -238,13 +238,13 @@ def test_at_the_end_all_but_the_successful_are_lost(tiny: Creature, task: str):
     clearance = np.array([*[0.02] * 5, -0.01 if task == "limbo" else np.inf])
     fell = np.array([np.inf, 21.0, *[np.inf] * 4])
     outcome = dataclasses.replace(became(ways, list(fell)), clearance=clearance)
-    lost = acceptance.lost(outcome, starts, FRAMES)
+    lost = acceptance.lost(outcome, starts, FRAMES, CONFIG)
     assert (~lost).tolist() == acceptance.succeeded(outcome, starts, CONFIG).tolist()
     assert lost.tolist() == [False, True, True, True, True, task == "limbo"]
     # A hopper that stands still can succeed until it must have arrived.
     before = round((CONFIG.seconds - acceptance.wanted(CONFIG).stay) / STEP)
-    assert not acceptance.lost(outcome, starts, before)[[2, 3, 4]].any()
-    assert acceptance.lost(outcome, starts, before + 1)[[2, 3, 4]].all()
+    assert not acceptance.lost(outcome, starts, before, CONFIG)[[2, 3, 4]].any()
+    assert acceptance.lost(outcome, starts, before + 1, CONFIG)[[2, 3, 4]].all()
 
 
 def test_simulations_end_when_the_losses_decide_the_result(tiny: Creature):
@@ -311,10 +311,10 @@ def test_the_goals_of_the_examination_are_new(tiny: Creature, trotter: Champion)
     """Neither evolution nor the draw that chooses champions has had them."""
     task = Hop(tiny, STEP, 1000, tiny.settings.termination)
     evolved = task.trials(key_of(0), tiny, RolloutConfig(starts=64)).goal[1:]
-    mine = goals(tiny, trials.own(trotter, CONFIG))
+    mine = goals(tiny, trials.own_draw(trotter, CONFIG))
     assert len(set(mine.tolist())) == 64
-    np.testing.assert_array_equal(mine, goals(tiny, trials.own(trotter, CONFIG)))
-    for known in (evolved, goals(tiny, trials.common(CONFIG)), [CONFIG.hop.nominal]):
+    np.testing.assert_array_equal(mine, goals(tiny, trials.own_draw(trotter, CONFIG)))
+    for known in (evolved, goals(tiny, trials.common_draw(CONFIG)), [CONFIG.hop.nominal]):
         assert not np.isin(mine.astype(np.float32), np.float32(known)).any()
     low, high = CONFIG.hop.goals
     assert low <= mine.min() < low + 0.2

@@ -14,7 +14,7 @@ from mjxgait.certification.feasibility import feasibility
 from mjxgait.certification.statics import IN_A_STEP, Statics
 from mjxgait.config.layers import find_creature, shipped_creatures
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.creature.textbook import Leg
 
 SHIPPED = [name for name in shipped_creatures() if name != "blocks"]
@@ -22,7 +22,7 @@ SHIPPED = [name for name in shipped_creatures() if name != "blocks"]
 
 @pytest.fixture(scope="module")
 def tiny() -> Creature:
-    return load_files({"creature.xml": XML, "creature.toml": TOML})
+    return creature_of({"creature.xml": XML, "creature.toml": TOML})
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from animation.keys.made import swings, write
 from helpers import STOOL, said_by
 
 from mjxgait.api.bodies import write_folder
+from mjxgait.config.layers import data_folder, find_file
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.importer import Imported
@@ -130,3 +131,43 @@ def test_an_invalid_import_is_not_written(tmp_path: Path, stool: Creature):
     with pytest.raises(UserError, match=r"creature\.toml"):
         write_folder(tmp_path / "out", Imported("broken", files, Notes(), True))
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("refine", "--task", "walk", "--keys", "walk.csv"), "--task walk: mjxgait refine has no"),
+        (("refine", "--env", STOOL, "--keys", "walk.csv", "--keep"), "--keep: give at least one"),
+        (("plot", "run", "--formats"), "--formats: give png, svg or both"),
+        (("render", "run", "--out", "film.webp", "--top", "0"), "--top 0: must lie between 1 and"),
+        (("inspect", "x" * 300), "name too long"),
+        (("ablate", "--resume", "study", "--seeds", "32"), "only --hours, --cluster may be given"),
+        (("refine", "--resume", "run", "--seed", "3"), "only --quiet, --verbose may be given"),
+    ],
+    ids=lambda value: " ".join(map(str, value))[:40] if isinstance(value, tuple) else "",
+)
+def test_an_option_without_an_effect_or_a_value_is_refused(
+    arguments: tuple[object, ...], words: str, tmp_path: Path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert words.lower() in said_by(capsys, *arguments, code=2).lower()
+
+
+def test_a_folder_does_not_hide_a_shipped_file(tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wilson").mkdir()
+    folder = data_folder("configs")
+    assert find_file(Path("wilson"), folder, "config") == folder / "wilson.toml"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("seeds = 2\n", 'seeds = 2\nbase = { use = "hop" }\n', "[base] use = 'hop': give a table"),
+        ('{ drive = { law = "pd" } }', "{ evolution = 5 }", "evolution = 5: give a table"),
+    ],
+)
+def test_a_table_of_a_study_must_be_one(old: str, new: str, words: str, tmp_path: Path, capsys):
+    assert old in STUDY
+    (tmp_path / "study.toml").write_text(STUDY.replace(old, new))
+    assert words in said_by(capsys, "ablate", tmp_path / "study.toml", "--dry-run", code=2)

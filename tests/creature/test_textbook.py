@@ -39,7 +39,7 @@ def feet_in(creature: Creature, pose: np.ndarray) -> tuple[np.ndarray, np.ndarra
         geoms = [
             [
                 g
-                for g, of in zip(creature.feet.stepping, creature.feet.geoms, strict=True)
+                for g, of in zip(creature.feet.stepping, creature.feet.foot_of_geoms, strict=True)
                 if of == n
             ]
             for n in range(len(creature.feet.names))

@@ -18,7 +18,7 @@ from mjxgait.environments.problem import make_problem
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
-from mjxgait.simulation.evaluator import Local
+from mjxgait.simulation.evaluator import LocalEvaluator
 from mjxgait.tasks.base import in_order
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.starts import Starts
@@ -81,7 +81,9 @@ def played_and_evaluated(environment: Environment, experiment: Experiment) -> tu
         push_step=starts.push_step.at[0].set(30),
     )
     simulated = jax.jit(experiment.simulate)(genomes, starts)
-    judged = jax.jit(Local(experiment.simulator).verdict)(experiment.row.settings, simulated)
+    judged = jax.jit(LocalEvaluator(experiment.simulator).evaluation_of)(
+        experiment.row.settings, simulated
+    )
     episode = partial(played, environment, experiment)
     trial = jax.tree.map(lambda leaf: jnp.repeat(leaf, COUNT, axis=0), starts)
     twice = jax.tree.map(lambda leaf: jnp.concatenate([leaf] * 2), genomes)

@@ -21,7 +21,7 @@ from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.controllers.key_poses.config import PoseConfig
 from mjxgait.controllers.key_poses.controller import PoseTracker
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.importer import ImportChoices, Imported, import_model
@@ -29,7 +29,7 @@ from mjxgait.importer.notes import Notes
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_arms import hanging
 from mjxgait.importer.rig_radii import radii_of
-from mjxgait.importer.rigged import model_of
+from mjxgait.importer.rigged import source_of_rig
 
 ARM: dict[str, Bone] = {
     "Collar": ("Chest", (3, 140, 0), None),
@@ -76,7 +76,7 @@ def imported(file: Path) -> Imported:
 
 @pytest.fixture(scope="module")
 def creature(imported: Imported) -> Creature:
-    return load_files(imported.files)
+    return creature_of(imported.files)
 
 
 def at_rest(creature: Creature, model: mujoco.MjModel) -> mujoco.MjData:
@@ -170,7 +170,7 @@ def test_a_hand_that_would_reach_the_floor_stays(tmp_path: Path):
 def test_only_arms_that_hang_swing(tmp_path: Path, bones: dict[str, Bone], arms: str):
     file = tmp_path / "rig.bvh"
     file.write_text(bvh(bones))
-    swings = model_of(file, None, None, Notes()).swings
+    swings = source_of_rig(file, None, None, Notes()).swings
     assert swings == {f"{side}Arm_pitch" for side in arms}
 
 
@@ -188,7 +188,9 @@ def test_the_files_rest_is_that_of_its_bones(creature: Creature):
 
 
 def test_frozen_arms_are_still(file: Path):
-    still = load_files(import_model(file, ImportChoices(apart=False, freeze=("*Arm_pitch",))).files)
+    still = creature_of(
+        import_model(file, ImportChoices(apart=False, freeze=("*Arm_pitch",))).files
+    )
     assert not still.joints.swings
     assert not [name for name in still.joints.names if "Arm" in name]
     hung = at_rest(still, still.model)
@@ -240,7 +242,7 @@ def test_a_wrong_table_is_refused(imported: Imported, old: str, new: str, said: 
     assert old in files["creature.toml"]
     files["creature.toml"] = files["creature.toml"].replace(old, new)
     with pytest.raises(UserError, match=re.escape(said)):
-        load_files(files)
+        creature_of(files)
 
 
 def test_the_characters_own_arms_hang_in_its_walk(creature: Creature, file: Path):

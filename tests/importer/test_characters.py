@@ -12,7 +12,7 @@ from importer.rigs import DOG, Bone, bvh, glb
 from mjxgait.animation.clips.read_glb import rig_of_glb
 from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.certification.check_body import check_body
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_hinges import hinges_of
@@ -84,7 +84,7 @@ def test_a_body_with_a_heavy_head_stands_with_its_feet_beneath_it(tmp_path: Path
 def test_what_hangs_in_the_middle_is_no_foot(tmp_path: Path):
     file = tmp_path / "dog.bvh"
     file.write_text(bvh(DOG | LOW))
-    creature = load_files(import_model(file, ImportChoices(apart=False)).files)
+    creature = creature_of(import_model(file, ImportChoices(apart=False)).files)
     feet = {name.removesuffix("_foot") for name in creature.feet.names}
     assert feet == {"LeftHand", "RightHand", "LeftHock", "RightHock"}
     # Without the tail, which ends at -0.78 m, and the head, which ends at 0.48 m.
@@ -154,7 +154,7 @@ def test_a_foot_and_its_fixed_toes_are_one(tmp_path: Path):
     }
     file = tmp_path / "dog.glb"
     file.write_bytes(glb(DOG | toe))
-    creature = load_files(import_model(file, ImportChoices(apart=False)).files)
+    creature = creature_of(import_model(file, ImportChoices(apart=False)).files)
     touching = {creature.model.geom_bodyid[g] for g in creature.feet.stepping}
     assert len(touching) > len(creature.feet.names) == 4
     check_body(creature)
@@ -164,7 +164,7 @@ def test_a_character_on_four_feet_walks_as_an_animal(tmp_path: Path):
     """Evolution begins near that walk, unless another gait is given, or any."""
     file = tmp_path / "dog.bvh"
     file.write_text(bvh(DOG))
-    creature = load_files(import_model(file, ImportChoices(apart=False)).files)
+    creature = creature_of(import_model(file, ImportChoices(apart=False)).files)
     usual = configured(creature, None, {}, WalkTargets())
     asked = configured(creature, None, {}, WalkTargets(gait="natural"))
     assert (usual.controller, usual.evolution) == (asked.controller, asked.evolution)
@@ -183,7 +183,7 @@ def test_a_narrow_character_steps_under_a_fall(tmp_path: Path, times: float, nar
     file = tmp_path / "dog.bvh"
     file.write_text(bvh(dog))
     made = import_model(file, ImportChoices(apart=False))
-    creature = load_files(made.files)
+    creature = creature_of(made.files)
     assert (np.abs(creature.feet.places[:, 1]).mean() < 0.28 * creature.frame.hip_height) == narrow
     assert creature.corrections.steps == narrow
     assert ("feet land under a fall" in made.notes.text()) == narrow

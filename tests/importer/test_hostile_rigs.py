@@ -9,14 +9,14 @@ from importer.rigs import glb
 
 from mjxgait.errors import UserError
 from mjxgait.importer.notes import Notes
-from mjxgait.importer.rigged import model_of
+from mjxgait.importer.rigged import source_of_rig
 from mjxgait.importer.source import Source
 
 
 def read(folder: Path, data: bytes) -> Source:
     file = folder / "dog.glb"
     file.write_bytes(data)
-    return model_of(file, None, None, Notes())
+    return source_of_rig(file, None, None, Notes())
 
 
 @pytest.mark.parametrize(("change", "words"), REFUSED.values(), ids=REFUSED)

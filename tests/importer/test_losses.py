@@ -41,8 +41,8 @@ def bring(folder: Path, text: str) -> str:
             "",
             '"shell" of body "trunk" has 4 kg, and its mesh "hull.stl" cannot be read',
         ),
-        ("", "", "a mass that only its mesh tells"),
-        ('group="3"', '<compiler inertiagrouprange="3 4"/>', "a mass that only its mesh tells"),
+        ("", "", "a mass that only its mesh states"),
+        ('group="3"', '<compiler inertiagrouprange="3 4"/>', "a mass that only its mesh states"),
     ],
 )
 def test_a_mass_in_a_mesh_that_is_missing_is_no_mass_to_lose(tmp_path, shape, head, told):
@@ -76,7 +76,7 @@ def test_a_link_that_only_its_mesh_gives_a_mass_is_refused(tmp_path):
         '<robot name="r"><link name="base"><collision><geometry><mesh filename="hull.stl"/>'
         "</geometry></collision></link></robot>"
     )
-    with pytest.raises(UserError, match='body "base" has a mass that only its mesh tells'):
+    with pytest.raises(UserError, match='body "base" has a mass that only its mesh states'):
         import_model(file, ImportChoices(apart=False))
 
 

@@ -200,5 +200,5 @@ def test_a_mass_that_only_an_unreadable_mesh_tells_is_refused(tmp_path: Path):
         weightless,
         count=1,
     )
-    with pytest.raises(UserError, match="a mass that only its mesh tells"):
+    with pytest.raises(UserError, match="a mass that only its mesh states"):
         bring_urdf(tmp_path, text)

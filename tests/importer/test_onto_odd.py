@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from mjxgait.animation.clips.clip import written
 from mjxgait.animation.export import WalkLoop, build_onto, read_character
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 
@@ -109,7 +109,7 @@ def bodies_of(creature: Creature, qpos: np.ndarray) -> list[np.ndarray]:
 def test_an_odd_character_moves_as_its_simulated_body(made: Callable[[], bytes], tmp_path: Path):
     file = tmp_path / "character.glb"
     file.write_bytes(made())
-    creature = load_files(import_model(file, ImportChoices(apart=False)).files)
+    creature = creature_of(import_model(file, ImportChoices(apart=False)).files)
     places = places_in(file, treading_loop(creature))
     assert np.ptp(places.bodies, axis=0).max() > 0.03 * creature.frame.hip_height
     off = places.off() / creature.frame.hip_height
@@ -120,7 +120,7 @@ def test_an_odd_character_moves_as_its_simulated_body(made: Callable[[], bytes],
 def test_arms_of_an_a_pose_hang_in_its_walk(tmp_path: Path):
     file = tmp_path / "person.glb"
     file.write_bytes(as_of_mixamo())
-    creature = load_files(import_model(file, ImportChoices(apart=False)).files)
+    creature = creature_of(import_model(file, ImportChoices(apart=False)).files)
     assert set(creature.settings.rig.turned) == {"LArm", "RArm"}
     character = read_character(file)
     _, data = build_onto({"walk": treading_loop(creature)}, character)
@@ -137,7 +137,7 @@ def test_arms_of_an_a_pose_hang_in_its_walk(tmp_path: Path):
 def test_bones_that_share_a_name_are_one_sentence(name: str, tmp_path: Path):
     file = tmp_path / "dog.glb"
     file.write_bytes(changed(ODD[name]))
-    creature = load_files(import_model(file, ImportChoices(apart=False)).files)
+    creature = creature_of(import_model(file, ImportChoices(apart=False)).files)
     with pytest.raises(UserError, match="has several bones called") as raised:
         build_onto({"walk": treading_loop(creature)}, read_character(file))
     assert "\n" not in str(raised.value)

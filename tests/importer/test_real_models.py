@@ -13,8 +13,8 @@ from importer.packages import MODELS, model_file
 from mjxgait.api.bodies import write_folder
 from mjxgait.creature import load_creature
 from mjxgait.creature.geometry import ancestors
+from mjxgait.creature.load import creature_of
 from mjxgait.creature.overlap import find_crossings
-from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.convert import Imported
@@ -116,7 +116,7 @@ def test_a_stance_that_was_searched_has_no_foot_within_the_hips(tmp_path: Path, 
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(creature.model, data)
     left = creature.frame.stand_rot @ creature.frame.left
-    for geom in creature.feet.watched[: len(creature.feet.foot_of)]:
+    for geom in creature.feet.stepping:
         bodies = ancestors(creature.model, int(creature.model.geom_bodyid[geom]))
         hips = [
             data.xanchor[j] @ left
@@ -137,7 +137,7 @@ def test_robot_dogs_share_one_program():
     """Twelve joints each, whatever rotors, sensors and shapes their files have."""
 
     def topology(name: str) -> Topology:
-        creature = load_files(imported_model(name).files)
+        creature = creature_of(imported_model(name).files)
         known = (creature.evolution_model, observation_layout(creature), find_crossings(creature))
         return lane_major_plant(*known, padded=True).topology
 

@@ -19,14 +19,15 @@ from mjxgait.animation.clips.read_text import read_bvh, rig_of_bvh
 from mjxgait.animation.keys.retarget import axes_of, retarget
 from mjxgait.cli.import_ import import_command
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import load_files, scaled
+from mjxgait.creature.load import creature_of
+from mjxgait.creature.scale import scaled
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, Imported, import_model
 from mjxgait.importer.notes import Notes
 from mjxgait.importer.rig import Plan
 from mjxgait.importer.rig_hinges import Hinge, hinges_of
 from mjxgait.importer.rig_radii import FOLDED, apart, points_along, radii_of, slimmer
-from mjxgait.importer.rigged import model_of
+from mjxgait.importer.rigged import source_of_rig
 
 FEET = ["LeftHand", "RightHand", "LeftHock", "RightHock"]
 SPIDER: dict[str, Bone] = {"Trunk": ("", (0, 10, 0), (0, 10, 8))} | {
@@ -66,7 +67,7 @@ def dog(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 
 @pytest.fixture(scope="module")
 def creature(dog: Imported) -> Creature:
-    return load_files(dog.files)
+    return creature_of(dog.files)
 
 
 def test_it_stands_on_its_four_feet(dog: Imported, creature: Creature):
@@ -79,7 +80,7 @@ def test_its_parts_can_be_scaled(creature: Creature):
     """Also where the standing pose is the zero pose, which MuJoCo leaves out of the file."""
     xml = creature.files["creature.xml"]
     plain = re.sub(r'(<key name="\w+") qpos="[^"]*"', r"\1", xml)
-    longer = scaled(load_files({**creature.files, "creature.xml": plain}), {"*Shin": 1.2})
+    longer = scaled(creature_of({**creature.files, "creature.xml": plain}), {"*Shin": 1.2})
     assert longer.frame.hip_height > 1.02 * creature.frame.hip_height
 
 
@@ -98,12 +99,12 @@ def test_its_joints_are_where_its_bones_begin(creature: Creature):
 def test_its_own_cycles_count_from_where_its_bones_rest(dog: Imported, tmp_path: Path):
     """Wherever it stands: here with its knees bent."""
     xml = dog.files["creature.xml"]
-    stand = load_files(dog.files)
+    stand = creature_of(dog.files)
     qpos = stand.stand_qpos.copy()
     knee = stand.joints.names.index("LeftShin_pitch")
     qpos[stand.joints.qpos_adr[[knee, stand.mirror.partner[knee]]]] += 0.2
     bent = re.sub(r'(name="stand" qpos=)"[^"]*"', rf'\1"{" ".join(map(str, qpos))}"', xml)
-    creature = load_files({**dog.files, "creature.xml": bent})
+    creature = creature_of({**dog.files, "creature.xml": bent})
     file = tmp_path / "walk.bvh"
     file.write_text(bvh(turned={"LeftShin": 20.0}))
     clip = read_bvh(file)
@@ -129,7 +130,7 @@ def test_every_guess_is_told(dog: Imported):
 
 def test_of_a_skin_its_bones_are_as_thick_as_it(tmp_path: Path):
     """And what moves no skin, such as handles of a rig, is no part of the body."""
-    tree = model_of(made(tmp_path, "glb"), None, None, Notes()).tree
+    tree = source_of_rig(made(tmp_path, "glb"), None, None, Notes()).tree
     bodies = {body.get("name"): body for body in tree.iter("body")}
     assert set(bodies) == set(DOG)
     for leg in ("LeftThigh", "RightShin", "LeftForearm"):
@@ -148,7 +149,7 @@ def test_the_unit_is_that_of_a_creatures_size_or_as_told(tmp_path, factor, heigh
     file = tmp_path / "dog.bvh"
     file.write_text(bvh(scaled))
     notes = Notes()
-    model_of(file, None, height, notes)
+    source_of_rig(file, None, height, notes)
     assert next(g for g in notes.guesses if g.what == "height").value == f"{tall:g} m"
 
 
@@ -172,9 +173,9 @@ def test_up_is_where_limbs_come_down_to_the_floor(tmp_path: Path, bones: Mapping
     file = tmp_path / "rig.bvh"
     for kind, up in ((bones, "y"), (upright(bones), "z")):
         file.write_text(bvh(kind))
-        assert model_of(file, None, None, Notes()).up.value == up
+        assert source_of_rig(file, None, None, Notes()).up.value == up
     file.write_text(bvh(bones))
-    assert model_of(file, "z", None, Notes()).up.value == "z"  # as told
+    assert source_of_rig(file, "z", None, Notes()).up.value == "z"  # as told
 
 
 def test_ears_are_no_limbs(tmp_path: Path):
@@ -225,7 +226,7 @@ def test_a_cycle_of_its_own_rig_is_read_in_the_axes_of_that_file(tmp_path: Path)
     """Of another file with the same names in those that its joints can follow better."""
     file = tmp_path / "dog.bvh"
     file.write_text(bvh(upright(DOG)))
-    own = load_files(import_model(file, ImportChoices(apart=False)).files)
+    own = creature_of(import_model(file, ImportChoices(apart=False)).files)
     names = ("Hips", "LeftThigh")
     bones = dict(zip(names, names, strict=True))
     for ahead in (np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])):
@@ -334,7 +335,7 @@ def test_an_imported_character_has_slim_legs(tmp_path: Path):
     """Its skin is 10 cm thick, and its shins are 16 cm apart."""
     file = tmp_path / "dog.glb"
     file.write_bytes(glb(thick=0.1))
-    tree = model_of(file, None, None, Notes()).tree
+    tree = source_of_rig(file, None, None, Notes()).tree
     sizes = {b.get("name"): b.find("geom") for b in tree.iter("body")}
     shins = [float(sizes[name].get("size")) for name in ("LeftShin", "RightShin")]
     assert max(shins) == pytest.approx(min(shins))
@@ -368,7 +369,7 @@ def test_limbs_that_lie_sideways_swing_about_the_upright_axis(tmp_path: Path):
 def test_names_lose_what_a_tool_put_before_them(tmp_path: Path):
     file = tmp_path / "dog.bvh"
     file.write_text(bvh(prefix="mixamorig:"))
-    source = model_of(file, None, None, Notes())
+    source = source_of_rig(file, None, None, Notes())
     tree, bones = source.tree, source.bones
     assert bones == {name: f"mixamorig:{name}" for name in DOG}
     assert {b.get("name") for b in tree.iter("body")} == set(DOG)
@@ -447,7 +448,7 @@ def test_whatever_happens_to_a_skeleton_on_its_way_there_is_no_traceback(tmp_pat
         file.write_bytes(bytes(data))
         with contextlib.suppress(UserError):
             try:
-                model_of(file, None, None, Notes())
+                source_of_rig(file, None, None, Notes())
             except UserError as error:
                 sentences.append(str(error))
                 raise

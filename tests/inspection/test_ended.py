@@ -104,7 +104,7 @@ def test_failed_forced_phases_end_the_run(run):
         config, evolution=dataclasses.replace(config.evolution, forced=forced, generations=9)
     )
     ended = dataclasses.replace(snapshot, config=patient).ended
-    assert ended == "forced evolution no longer pays: 1 spells in a row without growth"
+    assert ended == "forced evolution no longer pays: no growth in the last phase"
     islands = dataclasses.replace(patient.evolution.islands, count=2)
     several = dataclasses.replace(
         patient, evolution=dataclasses.replace(patient.evolution, islands=islands)

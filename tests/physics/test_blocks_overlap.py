@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from controllers.sims_brain.made_up import CAPACITY, LANES, bodies_of, genome_of, one, random_graphs
 
-from mjxgait.controllers.sims_brain.phenotype import Body
+from mjxgait.controllers.sims_brain.phenotype import GrownBody
 from mjxgait.controllers.sims_brain.reference_body import Part, grow
 from mjxgait.controllers.sims_brain.reference_files import body_files
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Surroundings
 from mjxgait.reference.grown import seen_grown
@@ -17,7 +17,7 @@ from mjxgait.reference.overlap import overlaps
 from mjxgait.types import BodyState
 
 
-def ours(bodies: Body, bent: np.ndarray) -> np.ndarray:
+def ours(bodies: GrownBody, bent: np.ndarray) -> np.ndarray:
     """Overlap [LANES] relative to the smaller block, for angles [LANES, links]."""
     tree = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), bodies.tree)
     root = np.tile([[0.0], [0], [0], [1], [0], [0], [0]], LANES)
@@ -27,12 +27,12 @@ def ours(bodies: Body, bent: np.ndarray) -> np.ndarray:
     return np.asarray(jax.jit(TreePlant(Surroundings(floor=False)).overlap)(state))
 
 
-def theirs(body: Body, parts: list[Part], bent: np.ndarray) -> tuple[float, float]:
+def theirs(body: GrownBody, parts: list[Part], bent: np.ndarray) -> tuple[float, float]:
     """Overlap, and depth of a far end in the next block, relative to the smaller block.
 
     bent: [links] angles.
     """
-    creature = load_files(body_files(parts, "blocks", 0.01, 0.0, None, "in water"))
+    creature = creature_of(body_files(parts, "blocks", 0.01, 0.0, None, "in water"))
     qpos = creature.stand_qpos.copy()
     for part in range(1, len(parts)):
         for hinge in range(len(parts[part].hinges)):

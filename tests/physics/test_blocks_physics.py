@@ -13,7 +13,7 @@ import pytest
 from controllers.sims_brain.made_up import LANES, bodies_of, genome_of, one, random_graphs
 
 from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
-from mjxgait.controllers.sims_brain.phenotype import Body
+from mjxgait.controllers.sims_brain.phenotype import GrownBody
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.controllers.sims_brain.reference_files import body_xml
 from mjxgait.creature.geometry import DOWN, geom_reach, lowest
@@ -54,7 +54,7 @@ def graphs() -> Graph:
 
 
 @pytest.fixture(scope="module")
-def bodies(graphs: Graph) -> Body:
+def bodies(graphs: Graph) -> GrownBody:
     return bodies_of(graphs, CAPACITY)
 
 
@@ -67,7 +67,7 @@ def model_of(graph: Graph, around: Surroundings) -> mujoco.MjModel:
     return model
 
 
-def links_of(body: Body, model: mujoco.MjModel) -> list[int]:
+def links_of(body: GrownBody, model: mujoco.MjModel) -> list[int]:
     """The link of each hinge of the model, in its order."""
     names = [model.joint(j).name.removeprefix("part").split("_") for j in range(1, model.njnt)]
     return [
@@ -80,7 +80,7 @@ def links_of(body: Body, model: mujoco.MjModel) -> list[int]:
     ]
 
 
-def moments(bodies: Body, height: float, seed: int = 0) -> BodyState:
+def moments(bodies: GrownBody, height: float, seed: int = 0) -> BodyState:
     """One state per lane: any attitude, joints beyond their ranges, everything in motion."""
     rng, moves = np.random.default_rng(seed), np.asarray(bodies.tree.moves)[:, 1:].T
     quat = rng.normal(size=(4, LANES))
@@ -99,7 +99,7 @@ def moments(bodies: Body, height: float, seed: int = 0) -> BodyState:
 
 
 def in_mujoco(
-    graph: Graph, body: Body, state: BodyState, lane: int, around: Surroundings
+    graph: Graph, body: GrownBody, state: BodyState, lane: int, around: Surroundings
 ) -> tuple[mujoco.MjModel, mujoco.MjData, list[int]]:
     """The lane's body and state, and the links of its hinges."""
     model = model_of(graph, around)
@@ -111,7 +111,7 @@ def in_mujoco(
     return model, data, links
 
 
-def test_masses_and_inverse_weights_match_mujoco(graphs: Graph, bodies: Body):
+def test_masses_and_inverse_weights_match_mujoco(graphs: Graph, bodies: GrownBody):
     for lane in range(LANES):
         body = one(bodies, lane)
         model = model_of(one(graphs, lane), ON_LAND)
@@ -133,7 +133,7 @@ AIR = pytest.param(
 
 
 @pytest.mark.parametrize("around", [ON_LAND, AIR], ids=["land", "air"])
-def test_one_step_matches_c_mujoco(graphs: Graph, bodies: Body, around: Surroundings):
+def test_one_step_matches_c_mujoco(graphs: Graph, bodies: GrownBody, around: Surroundings):
     state = moments(bodies, 0.3)
     moves = np.concatenate([np.zeros((6, LANES)), np.asarray(bodies.tree.moves)[:, 1:].T])
     torque = np.random.default_rng(2).normal(size=moves.shape) * moves * 5
@@ -153,7 +153,7 @@ def test_one_step_matches_c_mujoco(graphs: Graph, bodies: Body, around: Surround
     assert not still.any(), "what is not there does not move"
 
 
-def test_sensed_values_match_c_mujoco(graphs: Graph, bodies: Body):
+def test_sensed_values_match_c_mujoco(graphs: Graph, bodies: GrownBody):
     state = moments(bodies, 0.3)
     sensed, _ = looked_at(state)
     for lane in range(LANES):
@@ -178,7 +178,7 @@ def test_sensed_values_match_c_mujoco(graphs: Graph, bodies: Body):
         np.testing.assert_allclose(sensed.trunk_angvel[:, lane], spin, atol=1e-5)
 
 
-def test_touching_corners_match_c_mujoco(graphs: Graph, bodies: Body):
+def test_touching_corners_match_c_mujoco(graphs: Graph, bodies: GrownBody):
     """The four corners below a block's centre, however deep in the ground."""
     state = moments(bodies, 0.0)
     distance = looked_at(state)[1].reshape(-1, CAPACITY.links, LANES)
@@ -193,7 +193,7 @@ def test_touching_corners_match_c_mujoco(graphs: Graph, bodies: Body):
             np.testing.assert_allclose(mine[mine < 0], touching, atol=1e-5)
 
 
-def test_bodies_start_on_the_ground(graphs: Graph, bodies: Body):
+def test_bodies_start_on_the_ground(graphs: Graph, bodies: GrownBody):
     """With straight joints at the height of their files; with bent joints on the lowest corner.
     In water they stay in place.
     """
@@ -219,7 +219,7 @@ def test_bodies_start_on_the_ground(graphs: Graph, bodies: Body):
     np.testing.assert_array_equal(wet.rested(same, bent[0]), bent[0])
 
 
-def test_each_lane_may_have_its_own_medium(bodies: Body):
+def test_each_lane_may_have_its_own_medium(bodies: GrownBody):
     """Lanes in water and on land move as in a program for their medium alone."""
     mixed = dataclasses.replace(ON_LAND, drag=IN_WATER.drag)
     state, wet = moments(bodies, 0.1), np.arange(LANES) % 2 == 0
@@ -236,7 +236,7 @@ def test_each_lane_may_have_its_own_medium(bodies: Body):
     np.testing.assert_array_equal(after.ground.wet, wet)
 
 
-def test_sinking_depth_is_relative_to_block_size(bodies: Body):
+def test_sinking_depth_is_relative_to_block_size(bodies: GrownBody):
     state = moments(bodies, 0.0)
     sensed, _ = looked_at(state)
     for lane in range(LANES):
@@ -247,7 +247,7 @@ def test_sinking_depth_is_relative_to_block_size(bodies: Body):
         assert sensed.body.depth[lane] == pytest.approx(deepest, rel=1e-4, abs=1e-6)
 
 
-def test_light_direction_is_in_each_blocks_own_axes(graphs: Graph, bodies: Body):
+def test_light_direction_is_in_each_blocks_own_axes(graphs: Graph, bodies: GrownBody):
     state, place = moments(bodies, 0.3), np.array([3.0, -4.0, 1.0])
     sensed, _ = looked_at(state)
     unused: Any = None

@@ -31,9 +31,9 @@ class BodyPerStart(Simulator):
     numbers: Any = None
 
     def _fresh_lane(
-        self, plans: Any, starts: Any, settings: Any, own: Any, job: jax.Array, episode: jax.Array
+        self, plans: Any, starts: Any, settings: Any, own: Any, place: jax.Array, episode: jax.Array
     ) -> Lane:
-        lane = super()._fresh_lane(plans, starts, settings, own, job, episode)
+        lane = super()._fresh_lane(plans, starts, settings, own, place, episode)
         own = jax.tree.map(lambda leaf: leaf[episode % len(BODIES)], self.numbers)
         return dataclasses.replace(lane, body=dataclasses.replace(lane.body, parameters=own))
 

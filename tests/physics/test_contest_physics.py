@@ -177,7 +177,7 @@ def contest() -> SimpleNamespace:
     known = dataclasses.replace(state, genomes=own, fitness=blank[0, 0], terms=blank, outcome=blank)
     creature = experiment.champion(known, {}).embodied(blocks)
     start = jax.tree.map(lambda leaf: leaf[0], experiment.starts)
-    body = first_body(jax.jit(experiment.simulator.bodies)(met, start))
+    body = first_body(jax.jit(experiment.simulator.grow)(met, start))
     return SimpleNamespace(plant=experiment.simulator.plant, body=body, creature=creature)
 
 

@@ -33,7 +33,9 @@ def test_moments_are_evenly_spaced_up_to_the_farthest_point(stool_walk: Walk):
 
 
 def test_a_long_path_has_no_more_moments_than_a_picture_holds(stool_walk: Walk):
-    assert len(filmstrip.moments(sent(stool_walk, np.linspace(0, 100, 500)))) <= filmstrip.MOST
+    assert (
+        len(filmstrip.moments(sent(stool_walk, np.linspace(0, 100, 500)))) <= filmstrip.MAX_MOMENTS
+    )
 
 
 def test_a_stationary_walk_is_drawn_once(stool_walk: Walk):

@@ -21,7 +21,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
 from mjxgait.simulation.episode import reason_of
-from mjxgait.simulation.evaluator import Local
+from mjxgait.simulation.evaluator import LocalEvaluator
 from mjxgait.simulation.rollout import Episodes
 from mjxgait.tasks.base import in_order
 from mjxgait.tasks.falls import Reason
@@ -75,7 +75,7 @@ def simulate(experiment: Experiment, population: Genome, starts: Starts | None =
 def evaluation(
     experiment: Experiment, population: Genome, starts: Starts | None = None
 ) -> Evaluation:
-    verdict = jax.jit(Local(experiment.simulator).verdict)
+    verdict = jax.jit(LocalEvaluator(experiment.simulator).evaluation_of)
     return verdict(experiment.row.settings, simulate(experiment, population, starts))
 
 

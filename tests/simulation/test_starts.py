@@ -132,11 +132,11 @@ def test_bodies_have_the_masses_of_their_starts(weighed: Experiment):
         """The body of a lane in the second start."""
         prepare = jax.vmap(jax.vmap(simulator.controller.prepare, (0, None)))
         plans = prepare(genomes, rows[-1].controller)
-        job = jnp.int32(0)
-        return simulator._fresh_lane(plans, *rows, None, job, jnp.int32(1)).body
+        place = jnp.int32(0)
+        return simulator._fresh_lane(plans, *rows, None, place, jnp.int32(1)).body
 
     own = lane().parameters
-    for leaf, its, one in zip(*map(jax.tree.leaves, (starts.numbers, masses, own)), strict=True):
+    for leaf, its, one in zip(*map(jax.tree.leaves, (starts.parameters, masses, own)), strict=True):
         np.testing.assert_allclose(leaf[1], its, rtol=1e-6)
         np.testing.assert_array_equal(leaf[1], one)
 

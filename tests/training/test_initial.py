@@ -121,9 +121,21 @@ def test_another_body_is_refused(first: Path, tmp_path: Path):
 
 
 def test_a_damaged_file_is_one_sentence(second: Path, tmp_path: Path):
-    (tmp_path / INITIAL).write_bytes((second / INITIAL).read_bytes()[:100])
+    whole = (second / INITIAL).read_bytes()
+    (tmp_path / INITIAL).write_bytes(whole[:100])
     with pytest.raises(UserError, match=f"^{tmp_path / INITIAL}: damaged"):
         read_initial(tmp_path)
+    refused = []
+    for place in range(40, len(whole), max(len(whole) // 60, 1)):
+        changed = bytearray(whole)
+        changed[place] ^= 0xFF
+        (tmp_path / INITIAL).write_bytes(changed)
+        try:
+            read_initial(tmp_path)
+        except UserError as error:
+            refused.append(str(error))
+    assert len(refused) > 30  # a byte of a name or a date may change unseen
+    assert all(text.startswith(f"{tmp_path / INITIAL}: damaged") for text in refused)
 
 
 def test_the_option_is_for_a_single_new_run(first: Path, capsys):

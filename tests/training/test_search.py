@@ -14,6 +14,7 @@ from rich.console import Console
 from mjxgait.config.evolution import RestartConfig
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
+from mjxgait.inspect import individual_facts, read_snapshot
 from mjxgait.training import loop, stages
 from mjxgait.training.experiment import build_batch
 from mjxgait.training.folder import create_run, open_run
@@ -55,6 +56,11 @@ def test_the_strategy_improves_and_its_run_says_so(whole: Path):
     best = [line["best"] for line in read_metrics(whole / "metrics.jsonl")]
     assert best[-1] > best[0]
     assert open_run(whole)[1].evolution.search == "es"
+
+
+def test_a_run_of_the_strategy_can_be_inspected(whole: Path):
+    individual = individual_facts(read_snapshot(whole), 1)
+    assert individual["kind"] == "drawn"
 
 
 def test_a_resumed_run_ends_with_the_same_bits(whole: Path, stool: Creature, tmp_path: Path):

@@ -8,7 +8,7 @@ import numpy as np
 from end_to_end.unevolved import embodied
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.acceptance import how_simulated
+from mjxgait.certification.acceptance import task_rules
 from mjxgait.certification.trials import simulate
 from mjxgait.config.layers import data_folder
 from mjxgait.controllers.sims_brain.reference import KEPT, brain_reference
@@ -58,7 +58,7 @@ def examined(creature, champion, seconds, disturbed, push, light=None):
     """The same by the examiner: poses [T, nq], targets or for brains torques [T, J], and s until
     the fall or infinity.
     """
-    task = how_simulated(champion.task, champion.wish)
+    task = task_rules(champion.task, champion.wish)
     plain = task.aimed(nominal_starts(creature, 1), CertificateConfig())
     if light is not None:
         plain = dataclasses.replace(plain, light=np.array([light]))

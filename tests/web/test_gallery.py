@@ -155,7 +155,7 @@ def test_a_mistake_is_one_sentence_and_writes_nothing(case, runs, tmp_path, monk
 
 
 def test_more_than_a_page_holds_is_refused(runs, tmp_path, monkeypatch):
-    monkeypatch.setattr("mjxgait.api.galleries.MOST", 0)
+    monkeypatch.setattr("mjxgait.api.galleries.MAX_CHAMPIONS", 0)
     with pytest.raises(UserError, match="at most 0"):
         mjxgait.gallery(runs / "seed0", tmp_path / "all.html")
     assert (runs / "seed0" / CHAMPION).is_file()

@@ -192,7 +192,7 @@ def test_idle_connections_are_limited_and_closed(run, monkeypatch):
 
 def test_a_port_in_use_is_reported(site, run):
     _, address = site
-    with pytest.raises(UserError, match="taken by another program"):
+    with pytest.raises(UserError, match="cannot be used"):
         open_server(Watcher(run), int(address.rsplit(":", 1)[1]))
 
 

@@ -204,9 +204,10 @@ def strips_of(actions: Mapping[Any, Sequence[Any]], faster: float = 1.0, walk: A
 
 
 def stay(thing: Any, action: Any) -> None:
-    """Key where an object is in an action of its that says nothing of it.
+    """Key an object's location, rotation and scale in an action that has no curves for them.
 
-    Strips put what another strip moves, and they do not, at nought and the scale at one.
+    While a strip plays, Blender resets channels that only other strips animate: location to 0,
+    scale to 1.
     """
     play(thing, action)
     known = {curve.data_path for curve in curves_of(action, thing)}

@@ -121,9 +121,13 @@ def read_glb(path: Path) -> Clip:
 
 
 def _turn(node: Part) -> np.ndarray:
-    """Rotation [3, 3] of a node at rest."""
+    """Rotation [3, 3] of a node at rest; a mirrored node is turned as its mirror image."""
+    if not node.matrix:
+        return Rotation.from_quat(node.rotation or [0.0, 0.0, 0.0, 1.0]).as_matrix()
     columns = placed(node)[:3, :3]
-    return Rotation.from_matrix(columns / np.linalg.norm(columns, axis=0)).as_matrix()
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    columns[:, 0] *= np.sign(np.linalg.det(columns)) or 1.0
+    return Rotation.from_matrix(columns).as_matrix()
 
 
 def _note(nodes: Sequence[Part]) -> str:
@@ -251,6 +255,8 @@ def _skins(document: Document, number: int, world: np.ndarray) -> Mapping[int, n
             values(document, stored, every)
             for stored in (parts.POSITION, parts.JOINTS_0, parts.WEIGHTS_0)
         )
+        if document.accessors[parts.POSITION].normalized:
+            places = shares(places)
         most = shares(weights).argmax(1)
         main = named[np.arange(len(named)), most].astype(int)
         spots = np.concatenate([places.astype(float), np.ones((len(places), 1))], 1)

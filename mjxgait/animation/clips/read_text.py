@@ -34,7 +34,10 @@ def read_csv(path: Path) -> AngleTrack:
       UserError: names the line that cannot be read.
     """
     reader = csv.reader(read_text(path).splitlines())
-    lines = [(reader.line_num, row) for row in reader if row]
+    try:
+        lines = [(reader.line_num, row) for row in reader if row]
+    except csv.Error as error:
+        raise UserError(f"{path}: line {reader.line_num}: {error}") from None
     names = [name.strip() for name in lines[0][1]] if lines else []
     if "time" not in names:
         raise UserError(f'{path}: its first line must name the columns, one of them "time"')
@@ -101,7 +104,7 @@ CUT_OFF = "is cut off or damaged: a number or a word is missing"
 
 
 @dataclasses.dataclass
-class Skeleton:
+class BvhBones:
     """Bones in the order of the file, in its units.
 
     For each bone its name, parent (-1 for none), channels, offset [3] from its parent, and the
@@ -153,6 +156,7 @@ def rig_of_bvh(path: Path) -> Rig:
         bones, _ = _hierarchy(path, _words(path))
     except (IndexError, ValueError):
         raise UserError(f"{path}: {CUT_OFF}") from None
+    check_size(path, len(bones.names), 2)
     places = np.array(bones.offsets).reshape(-1, 3)
     for bone, parent in enumerate(bones.parents):
         places[bone] += places[parent] if parent >= 0 else 0.0
@@ -171,9 +175,9 @@ def _words(path: Path) -> list[str]:
     return words
 
 
-def _hierarchy(path: Path, words: list[str]) -> tuple[Skeleton, int]:
+def _hierarchy(path: Path, words: list[str]) -> tuple[BvhBones, int]:
     """The bones, and the place of the word MOTION."""
-    bones, opened, ending, at = Skeleton(), -1, False, 1
+    bones, opened, ending, at = BvhBones(), -1, False, 1
     while words[at].upper() != "MOTION":
         word = words[at].upper()
         if word in ("ROOT", "JOINT"):
@@ -204,7 +208,7 @@ def _hierarchy(path: Path, words: list[str]) -> tuple[Skeleton, int]:
     return bones, at
 
 
-def _channels(path: Path, words: list[str], at: int, bones: Skeleton) -> int:
+def _channels(path: Path, words: list[str], at: int, bones: BvhBones) -> int:
     """Store the channels of the open bone, and return their number."""
     count = int(words[at + 1])
     named = words[at + 2 : at + 2 + count]
@@ -218,7 +222,7 @@ def _channels(path: Path, words: list[str], at: int, bones: Skeleton) -> int:
 def _motion(path: Path, words: list[str], at: int, width: int) -> tuple[float, np.ndarray]:
     """Time of a frame in s, and all values [F, channels]."""
     if words[at + 1].upper() != "FRAMES:" or words[at + 3].upper() != "FRAME":
-        raise UserError(f"{path}: MOTION does not tell Frames and Frame Time")
+        raise UserError(f"{path}: MOTION does not state Frames and Frame Time")
     frames, step = int(words[at + 2]), float(words[at + 5])
     check_size(path, 1, frames)
     if not 0 < step < 10:

@@ -22,7 +22,7 @@ SHOWN = 4
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Fit:
+class Placement:
     """Where the creature's world lies in the file's scene.
 
     factor: units of the file per m. turn: [3, 3] from the axes of `gltf_axes`. shift: [3] place of
@@ -39,7 +39,7 @@ class Fit:
         direction: np.ndarray = self.turn @ [0.0, 1.0, 0.0]
         return direction
 
-    def raised(self, height: float) -> "Fit":
+    def raised(self, height: float) -> "Placement":
         """Return the fit with the creature's world higher by this in units of the file."""
         return dataclasses.replace(self, shift=self.shift + height * self.up)
 
@@ -54,7 +54,7 @@ class Fit:
         return turned
 
 
-def fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> Fit:
+def fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> Placement:
     """The fit by least squares of the resting creature to the bones at rest.
 
     Then the floor is moved to where the feet are lowest at rest: a body that bends its knees to
@@ -68,14 +68,14 @@ def fitted(loop: WalkLoop, character: Character, bones: Mapping[str, int]) -> Fi
     creature = loop.walk.creature
     skeleton, axes = skeleton_of(creature.model, creature.trunk), gltf_axes(loop.walk.forward)
     pos, _ = world_poses(creature.rest_model, skeleton, resting(loop)[None], axes)
-    parts = pos[0, [skeleton.names.index(part) for part in bones]]
+    parts = pos[0, [skeleton.names.index(part, 1) for part in bones]]
     places = character.world[list(bones.values()), :3, 3]
     own, other = parts - parts.mean(0), places - places.mean(0)
     factor = float(np.sqrt((other**2).sum() / (own**2).sum()))
     if factor == 0.0:
         raise ValueError("all its bones are in one place")
     turn = Rotation.align_vectors(other, factor * own)[0].as_matrix()
-    plain = Fit(factor, turn, places.mean(0) - factor * turn @ parts.mean(0))
+    plain = Placement(factor, turn, places.mean(0) - factor * turn @ parts.mean(0))
     off = np.linalg.norm(plain.places(parts) - places, axis=1) / factor
     hip = creature.frame.hip_height
     if not (off < SLACK * hip).all():

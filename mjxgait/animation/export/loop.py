@@ -196,7 +196,10 @@ def _fitting_strides(walk: Walk, rate: int, most: int) -> tuple[int, int, int, i
 
 
 def _alike(walk: Walk, rate: int) -> tuple[int, int, int, int] | None:
-    """The same of a body that grew; its brain has no cycle: one time around."""
+    """Return first and last recorded frame, 1, and key frames less one, for a body that grew.
+
+    Its brain has no cycle, so the loop is the span whose ends are most alike.
+    """
     upright = walk.body_poses()[1][:, walk.creature.trunk].reshape(len(walk.qpos), 9)
     found = most_alike(walk.qpos[:, walk.creature.root_qpos + 7 :], upright, walk.time_step)
     return found and (*found, 1, max(round((found[1] - found[0]) * walk.time_step * rate), 2))

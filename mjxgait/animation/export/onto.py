@@ -19,7 +19,7 @@ from mjxgait.animation.clips.glb_document import DAMAGED, damaged
 from mjxgait.animation.clips.read_glb import name_of
 from mjxgait.animation.export.character import Character
 from mjxgait.animation.export.facts import measured_facts
-from mjxgait.animation.export.fit import Fit, fitted, lows, quoted
+from mjxgait.animation.export.fit import Placement, fitted, lows, quoted
 from mjxgait.animation.export.gltf import Buffer, add_channel, added
 from mjxgait.animation.export.loop import LOOP, WalkLoop, animation_of
 from mjxgait.animation.export.planted import planted
@@ -125,7 +125,7 @@ def _bones_of_feet(loop: WalkLoop, names_of: Mapping[str, str]) -> list[str]:
 
 
 def _goals(
-    loop: WalkLoop, character: Character, bones: Mapping[str, int], fit: Fit, travelling: bool
+    loop: WalkLoop, character: Character, bones: Mapping[str, int], fit: Placement, travelling: bool
 ) -> dict[int, Goal]:
     """Goals by node.
 
@@ -218,7 +218,7 @@ def _finished(
     loops: Mapping[str, WalkLoop],
     character: Character,
     bones: Mapping[str, int],
-    fit: Fit,
+    fit: Placement,
     tracks: Mapping[str, Mapping[Channel, np.ndarray]],
     travelling: bool,
 ) -> tuple[dict[str, str], bytes]:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.export.character import Character
-from mjxgait.animation.export.fit import Fit, lows_of_feet
+from mjxgait.animation.export.fit import Placement, lows_of_feet
 from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.animation.export.posed import Goal, posed
 from mjxgait.animation.export.skin import Sole, below, soles_of
@@ -27,12 +27,12 @@ CLOSE = 0.0045
 """Hip heights by which the skin may be off the simulated foot, and that into the floor."""
 LOWERED, SPARE = 4, 0.1
 """Tries, each with a lower body, until straight legs reach the floor; and what is left of CLOSE."""
-ROUNDS, DAMPED, MOST = 8, 0.05, 0.2
+ROUNDS, DAMPED, MAX_TURN = 8, 0.05, 0.2
 """Steps in which a leg finds its angles; damping over the leg's length; rad per step."""
 
 Bones = Mapping[str, int]
 """Node of the file by part of the creature."""
-GoalsOf = Callable[[WalkLoop, Fit], dict[int, Goal]]
+GoalsOf = Callable[[WalkLoop, Placement], dict[int, Goal]]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -60,8 +60,12 @@ class Leg:
 
 
 def planted(
-    loops: Mapping[str, WalkLoop], character: Character, bones: Bones, fit: Fit, goals_of: GoalsOf
-) -> tuple[Fit, dict[str, dict[int, Goal]]]:
+    loops: Mapping[str, WalkLoop],
+    character: Character,
+    bones: Bones,
+    fit: Placement,
+    goals_of: GoalsOf,
+) -> tuple[Placement, dict[str, dict[int, Goal]]]:
     """The fit with the body at its height, and the goals by loop with the feet on the floor.
 
     A character without skin at its feet keeps the fit.
@@ -118,8 +122,7 @@ def _legs(creature: Creature, character: Character, bones: Bones) -> list[Leg]:
     moves = {node for part, node in bones.items() if model.body(part).jntnum[0]}
     moves.discard(bones[model.body(creature.trunk).name])
     for foot in range(len(feet.names)):
-        geoms = [geom for geom, own in zip(feet.stepping, feet.foot_of, strict=True) if own == foot]
-        names = [model.body(model.geom_bodyid[geom]).name for geom in geoms]
+        names = [model.body(model.geom_bodyid[geom]).name for geom in feet.geoms_of(foot)]
         own = {bones[name] for name in names if name in bones}
         tops.append(next((n for n in character.order if n in own), -1))
         nodes.append(below(character, own))
@@ -146,7 +149,7 @@ def _following(
 
 
 def _floor(
-    creature: Creature, character: Character, bones: Bones, legs: Sequence[Leg], fit: Fit
+    creature: Creature, character: Character, bones: Bones, legs: Sequence[Leg], fit: Placement
 ) -> float:
     """Height of the floor in the scene.
 
@@ -198,7 +201,7 @@ def _bend(goals: dict[int, Goal], leg: Leg, arms: np.ndarray, way: np.ndarray) -
     damped = DAMPED**2 * np.square(arms).sum(2).max(1)
     square = jacobian.transpose(0, 2, 1) @ jacobian + damped[:, None, None] * np.eye(3)
     angles = (jacobian @ np.linalg.solve(square, way[..., None])).reshape(arms.shape)
-    angles /= np.maximum(np.abs(angles).max((1, 2), keepdims=True) / MOST, 1.0)
+    angles /= np.maximum(np.abs(angles).max((1, 2), keepdims=True) / MAX_TURN, 1.0)
     for i, node in enumerate(leg.turning):
         by = Rotation.from_rotvec(angles[:, i]).as_matrix()
         for each in leg.follows[node]:

@@ -7,7 +7,7 @@ import numpy as np
 
 SETTLED = 2.0
 """Time before the first frame of a loop in s, if the motion is long enough."""
-LEAST, MOST = 1.0, 5.0
+MIN_SECONDS, MAX_SECONDS = 1.0, 5.0
 """Shortest and longest loop in s."""
 EACH = 0.02
 """Time between frames that are compared in s."""
@@ -27,13 +27,13 @@ def most_alike(
     state = np.concatenate([pose, LOOKAHEAD * np.gradient(pose, time_step, axis=0)], axis=1)
     state = state[::every]
     step = every * time_step
-    settled = min(round(SETTLED / step), max(len(state) - round(2 * MOST / step), 0))
+    settled = min(round(SETTLED / step), max(len(state) - round(2 * MAX_SECONDS / step), 0))
     state = state[settled:]
-    if len(state) <= round(LEAST / step) + 1:
+    if len(state) <= round(MIN_SECONDS / step) + 1:
         return None
     squares = (state**2).sum(1)
     apart = squares[:, None] + squares - 2 * state @ state.T
     gap = np.arange(len(state)) - np.arange(len(state))[:, None]
-    apart[(gap * step < LEAST) | (gap * step > MOST)] = np.inf
+    apart[(gap * step < MIN_SECONDS) | (gap * step > MAX_SECONDS)] = np.inf
     first, last = divmod(int(apart.argmin()), len(state))
     return every * (settled + first), every * (settled + last)

@@ -35,7 +35,7 @@ class Skeleton:
 def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
     """The bodies of the trunk's tree with their own axes, below a root that stays on the floor.
 
-    So are other moving bodies, if there are any: an opponent, and a cube.
+    Other moving bodies (an opponent, a cube) are included.
     """
     own = (model.body_rootid == model.body_rootid[trunk]) | (model.body_treeid >= 0)
     bodies = [0, *(int(b) for b in np.flatnonzero(own))]

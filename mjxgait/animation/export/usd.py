@@ -55,8 +55,10 @@ def export_usd(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
         root = UsdSkel.Root.Define(stage, f"/{_word(creature.name)}")
         stage.SetDefaultPrim(root.GetPrim())
         joints = _add_skeleton(stage, root.GetPath(), loop, skeleton, travelling)
-        for piece in pieces_of(loop.walk.dressed, skeleton, axes, rest):
-            _add_piece(stage, root.GetPath(), piece, joints)
+        for number, piece in enumerate(pieces_of(loop.walk.dressed, skeleton, axes, rest)):
+            # Several pieces may have one name, and one may be called as the skeleton is.
+            place = root.GetPath().AppendChild(f"piece_{number}_{_word(piece.name)}")
+            _add_piece(stage, place, piece, joints)
         stage.GetRootLayer().Save()
 
 
@@ -91,11 +93,11 @@ def _add_skeleton(
     return bones.GetPath()
 
 
-def _add_piece(stage: "Usd.Stage", root: "Sdf.Path", piece: Piece, skeleton: "Sdf.Path") -> None:
-    """Add a mesh of one colour, bound to the skeleton."""
+def _add_piece(stage: "Usd.Stage", place: "Sdf.Path", piece: Piece, skeleton: "Sdf.Path") -> None:
+    """Add a mesh of one colour at a place of its own, bound to the skeleton."""
     from pxr import UsdGeom, UsdSkel, Vt
 
-    mesh = UsdGeom.Mesh.Define(stage, root.AppendChild(_word(piece.name)))
+    mesh = UsdGeom.Mesh.Define(stage, place)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(piece.points.astype(np.float32)))
     mesh.CreateFaceVertexIndicesAttr(piece.faces.ravel().tolist())
     mesh.CreateFaceVertexCountsAttr([3] * len(piece.faces))

@@ -6,11 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.animation.clips.clip import ELSEWHERE, AngleTrack, Clip
+from mjxgait.animation.clips.clip import ELSEWHERE, AngleTrack, Clip, written
 from mjxgait.animation.clips.fbx import FBX, read_fbx
 from mjxgait.animation.clips.read_glb import read_glb
 from mjxgait.animation.clips.read_text import read_bvh, read_csv, read_json
-from mjxgait.animation.keys.cycle import Cycle, Fit, Own, find_cycle, fit_poses, own_poses
+from mjxgait.animation.keys.cycle import (
+    Cycle,
+    EditedWalk,
+    Fit,
+    check_ends,
+    find_cycle,
+    fit_poses,
+    own_poses,
+)
 from mjxgait.animation.keys.retarget import Retargeted, axes_of, matched, movers, retarget
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -40,7 +48,7 @@ class Brought:
     track: Retargeted
     cycle: Cycle
     fit: Fit
-    own: Own | None = None
+    own: EditedWalk | None = None
 
 
 def bring(
@@ -110,8 +118,9 @@ def _cut(read: Read, ends: tuple[float | None, float | None]) -> Read:
     """The part between the ends, and one frame more on each side.
 
     Raises:
-      UserError: it is too long to search for a cycle.
+      UserError: it is too long to search for a cycle, or the file does not have these seconds.
     """
+    check_ends(read.times, *ends)
     first, last = (
         int(np.searchsorted(read.times, end)) if end is not None else other
         for end, other in zip(ends, (0, len(read.times)), strict=True)
@@ -146,7 +155,7 @@ def _angles(creature: Creature, read: AngleTrack, names: Mapping[str, str]) -> R
 def name_lines(names: Mapping[str, str], wanted: list[str], found: tuple[str, ...]) -> list[str]:
     """Report lines: the matched names."""
     lines = [f"names: {len(names)} of {len(wanted)} parts have a bone or a column"]
-    lines += [f"  {own} <- {other}" for own, other in names.items()]
+    lines += [f"  {own} <- {written(other)}" for own, other in names.items()]
     if left := [name for name in wanted if name not in names]:
         lines.append(f"  stay as they stand: {', '.join(left)}")
     if unused := len(set(found) - set(names.values())):
@@ -178,7 +187,7 @@ def fit_lines(fit: Fit) -> list[str]:
     return [f"key poses: {len(fit.key_poses)}, {error:.1f} degrees from it (root mean square)"]
 
 
-def own_lines(own: Own) -> list[str]:
+def own_lines(own: EditedWalk) -> list[str]:
     """Report line: the changes to an exported walk."""
     count, changed = len(own.fit.key_poses), np.degrees(own.changed)
     return [

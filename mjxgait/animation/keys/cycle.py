@@ -17,10 +17,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from mjxgait.controllers.key_poses.config import gene_names
+from mjxgait.controllers.key_poses.serialize import PoseSerializer
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 
 SAMPLES = 120
+MOST_SAMPLES = 1500
+"""Most samples of a file in which a cycle is searched for."""
 CLOSED = np.radians(5.0)
 """rad, root mean square; poses that differ by less count as the same pose of a cycle."""
 MIRRORED = np.radians(6.0)
@@ -63,10 +67,7 @@ def find_cycle(
     """
     first = times[0] if begin is None else begin
     last = times[-1] if end is None else end
-    if not times[0] <= first < last <= times[-1] + 1e-9:
-        raise UserError(
-            f"--from {first:g} --to {last:g}: the file has {times[0]:g} to {times[-1]:g} s"
-        )
+    check_ends(times, begin, end)
     if last - first < SHORTEST:
         raise UserError(f"a cycle of {last - first:.3g} s: at least {SHORTEST} s are needed")
     if np.ptp(angles[(times >= first) & (times <= last)], axis=0).max(initial=0) < STILL:
@@ -84,6 +85,20 @@ def find_cycle(
     mirrored = creature.mirror.symmetric and alike < MIRRORED
     angles = 0.5 * (whole + other) if mirrored else whole
     return Cycle(angles, float(period), float(first), gap, mirrored, whole)
+
+
+def check_ends(times: np.ndarray, begin: float | None, end: float | None) -> None:
+    """Refuse ends that are not in order, or not within the times [F] of a file, all in s.
+
+    Raises:
+      UserError: names the ends and the file's.
+    """
+    first = times[0] if begin is None else begin
+    last = times[-1] if end is None else end
+    if not times[0] <= first < last <= times[-1] + 1e-9:
+        raise UserError(
+            f"--from {first:g} --to {last:g}: the file has {times[0]:g} to {times[-1]:g} s"
+        )
 
 
 def interpolated(at: np.ndarray, times: np.ndarray, angles: np.ndarray) -> np.ndarray:
@@ -105,7 +120,7 @@ def _period(times: np.ndarray, angles: np.ndarray, first: float, last: float) ->
     at which the poses repeat over the rest of the clip.
     """
     length = last - first
-    count = max(round(length / np.median(np.diff(times))), 2)
+    count = min(max(round(length / np.median(np.diff(times))), 2), MOST_SAMPLES)
     samples = _sampled(times, angles, first, length, 4 * count + 1)
     moves = np.sqrt(np.mean(samples.std(0) ** 2))
 
@@ -197,7 +212,7 @@ UNCHANGED = np.radians(0.5)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Own:
+class EditedWalk:
     """An exported walk with its edits.
 
     fit: key poses with the changes. cycle: as drawn; mirrored if the walk and the changes are.
@@ -211,18 +226,21 @@ class Own:
     tuning: Mapping[str, float]
 
 
-def own_poses(creature: Creature, note: str, cycle: Cycle) -> Own | None:
+def own_poses(creature: Creature, note: str, cycle: Cycle) -> EditedWalk | None:
     """Read the note of an exported walk of this creature; return None for any other file."""
     names = creature.joints.names
     try:
         document = json.loads(note)
         if document["creature"] != creature.digest:
             return None
-        poses = np.array([[pose[n] for n in names] for pose in document["key_poses"]], float)
+        genome = PoseSerializer().genome(document, creature)
+        poses = genome["key_poses"]
         motion = np.array([document["motion"][n] for n in names], float).T
-        tuning = {str(name): float(value) for name, value in document["tuning"].items()}
+        genes = gene_names(creature.corrections.steps)
+        tuning = dict(zip(genes, map(float, genome["tuning"]), strict=True))
         mirrored, advance = bool(document["mirrored"]), str(document["advance"])
-        if not (np.isfinite(poses).all() and np.isfinite(motion).all() and len(motion) > 1):
+        numbers = np.concatenate([poses.ravel(), motion.ravel(), genome["tuning"]])
+        if not (poses.ndim == motion.ndim == 2 and len(motion) > 1 and np.isfinite(numbers).all()):
             return None
     except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError):
         return None
@@ -240,7 +258,7 @@ def own_poses(creature: Creature, note: str, cycle: Cycle) -> Own | None:
     changed = float(np.sqrt(np.mean(change**2)))
     fit = Fit(kept, changed, shift / len(motion), clipped)
     drawn = dataclasses.replace(cycle, angles=cycle.drawn, mirrored=mirrored)
-    return Own(fit, drawn, changed, advance, tuning)
+    return EditedWalk(fit, drawn, changed, advance, tuning)
 
 
 def _most(change: np.ndarray) -> float:

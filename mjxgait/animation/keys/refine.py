@@ -16,7 +16,8 @@ from mjxgait.animation.keys.cycle import interpolated
 from mjxgait.certification import criteria_of, read_certificate, verdict_of
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import Table, build, merge, not_none
-from mjxgait.controllers.key_poses.config import smooth
+from mjxgait.controllers.key_poses.config import STEPPING, TUNING, PoseConfig, smooth
+from mjxgait.controllers.key_poses.serialize import MOST_POSES
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.files import read_json, write_text
@@ -106,9 +107,13 @@ def refining(creature: Creature, config: Config, brought: Brought, keep: float) 
     }
     spread = config.evolution.initial_spread
     if own := brought.own:
-        ranges = dataclasses.asdict(config)["controller"]["tuning"]
+        ranges, note = dataclasses.asdict(config)["controller"], own.tuning
         near["advance"] = own.advance
-        tuning = {n: _near(own.tuning[n], ranges[n], 1.0 - keep) for n in own.tuning}
+        tuning, steps = (
+            {n: _near(note[n], ranges[table][n], 1.0 - keep) for n in genes if n in note}
+            for table, genes in (("tuning", TUNING), ("stepping", STEPPING))
+        )
+        near |= {"stepping": steps} if steps else {}
         spread = min(spread, OWN_SPREAD)
     if near["advance"] == "clock":
         whole = len(poses) * (1 + brought.cycle.mirrored)
@@ -152,6 +157,10 @@ def read_original(folder: Path, creature: Creature) -> Original:
         document = read_json(path)
         angles = np.array([document["joints"][name] for name in creature.joints.names], float).T
         known = {key: float(document[key]) for key in ("period", "starts")}
+        if not (angles.ndim == 2 and 0 < len(angles) <= MOST_POSES and np.isfinite(angles).all()):
+            raise ValueError
+        if not (known["period"] > 0 and np.isfinite(list(known.values())).all()):
+            raise ValueError
         return Original(str(document["source"]), angles, **known)
     except (ValueError, LookupError, TypeError, ArithmeticError):
         raise UserError(f"{path}: damaged; it must hold the cycle's angles by joint") from None
@@ -279,7 +288,10 @@ def runs_in(out: Path) -> list[Path]:
 
 def kept_by(run: Path) -> float:
     """The share of the original that a run keeps."""
-    return round(1.0 - open_run(run)[1].controller.within / FARTHEST, 6)
+    settings = open_run(run)[1].controller
+    if not isinstance(settings, PoseConfig):
+        raise UserError(f"{run}: was not made by `mjxgait refine`: its controller has no key poses")
+    return round(1.0 - settings.within / FARTHEST, 6)
 
 
 def check_front(out: Path, keeps: Sequence[float]) -> None:

@@ -13,7 +13,7 @@ from mjxgait.config.tables import (
     NonNegative,
     Positive,
 )
-from mjxgait.controllers.config import holds
+from mjxgait.controllers.config import check_every
 
 FUNCTIONS = {
     "+": 2,
@@ -35,7 +35,7 @@ MOST_NODES = 1024
 """Upper limit of the setting `nodes`."""
 
 
-def _known(names: tuple[str, ...]) -> tuple[str, ...]:
+def _check_functions(names: tuple[str, ...]) -> tuple[str, ...]:
     for name in names:
         if name not in FUNCTIONS:
             raise ValueError(f'"{name}" is no function; there are {" ".join(FUNCTIONS)}')
@@ -73,14 +73,14 @@ class ProgramConfig:
     """
 
     __pydantic_config__ = STRICT
-    functions: Annotated[tuple[str, ...], pydantic.AfterValidator(_known), SHAPE] = (
+    functions: Annotated[tuple[str, ...], pydantic.AfterValidator(_check_functions), SHAPE] = (
         "+",
         "-",
         "*",
         "/",
         "ifltz",
     )
-    every: Annotated[int, pydantic.AfterValidator(holds), SHAPE] = 4
+    every: Annotated[int, pydantic.AfterValidator(check_every), SHAPE] = 4
     senses: Annotated[tuple[str, ...], SHAPE] = ("*",)
     nodes: Annotated[int, pydantic.Field(ge=3, le=MOST_NODES), SHAPE] = 128
     depth: Annotated[int, pydantic.Field(ge=1), SHAPE] = 17

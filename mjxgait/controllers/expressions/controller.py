@@ -22,8 +22,8 @@ from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.controllers.base import Command, Senses
 from mjxgait.controllers.expressions.config import ProgramConfig
 from mjxgait.controllers.expressions.operators import (
+    PrimitiveSet,
     Trees,
-    Words,
     arity,
     program_variation,
     subtree_sizes,
@@ -34,8 +34,8 @@ from mjxgait.controllers.expressions.text import (
     EMPTY,
     FIRST_ADDED,
     FUNCTION_CODES,
-    LARGEST,
     LEAST_DIVISOR,
+    VALUE_LIMIT,
     Terminal,
     chosen_terminals,
     terminals,
@@ -62,25 +62,25 @@ class Listing:
     count: jax.Array
 
 
-def most_functions(words: Words) -> int:
+def most_functions(primitives: PrimitiveSet) -> int:
     """Return Q: without unary functions a tree has more terminals than functions."""
-    unary = any(ARITY[code] == 1 for code in words.functions)
-    return words.capacity if unary else max((words.capacity - 1) // 2, 1)
+    unary = any(ARITY[code] == 1 for code in primitives.functions)
+    return primitives.capacity if unary else max((primitives.capacity - 1) // 2, 1)
 
 
-def listed(trees: Trees, words: Words) -> Listing:
+def listed(trees: Trees, primitives: PrimitiveSet) -> Listing:
     """Return the function lists of trees [J, C]."""
-    one = jax.vmap(lambda code: _list_tree(code, words), out_axes=-1)(trees.code)
+    one = jax.vmap(lambda code: _list_tree(code, primitives), out_axes=-1)(trees.code)
     return dataclasses.replace(one, constants=trees.value.T)
 
 
-def _list_tree(code: jax.Array, words: Words) -> Listing:
-    capacity, most, senses = words.capacity, most_functions(words), len(words.senses)
+def _list_tree(code: jax.Array, primitives: PrimitiveSet) -> Listing:
+    capacity, most, senses = primitives.capacity, most_functions(primitives), len(primitives.senses)
     places, sizes = np.arange(capacity), subtree_sizes(code)
     is_function = (code != EMPTY) & (arity(code) > 0)
     count = jnp.sum(is_function)
     turn = count - jnp.cumsum(is_function)
-    known = jnp.asarray(words.senses, jnp.int32)
+    known = jnp.asarray(primitives.senses, jnp.int32)
     of_sense = jnp.argmax(code[:, None] == known, axis=1)
     row = jnp.where(code >= FIRST_ADDED, of_sense, senses + places)
     row = jnp.where(is_function, senses + capacity + turn, row)
@@ -163,7 +163,7 @@ def _apply(
     for name, given in _GIVES.items():
         if (code := FUNCTION_CODES[name]) in known:
             found = jnp.where(function == code, given(a, b, c), found)
-    return jnp.clip(found, -LARGEST, LARGEST)
+    return jnp.clip(found, -VALUE_LIMIT, VALUE_LIMIT)
 
 
 def _divided(a: jax.Array, b: jax.Array) -> jax.Array:
@@ -209,7 +209,7 @@ class Programs:
         self.known: tuple[Terminal, ...] = chosen_terminals(
             terminals(creature, added), settings.senses
         )
-        self.words = Words(
+        self.primitives = PrimitiveSet(
             tuple(FUNCTION_CODES[name] for name in settings.functions),
             tuple(terminal.code for terminal in self.known),
             settings.nodes,
@@ -220,20 +220,20 @@ class Programs:
         """The first generation begins with the programs of the settings."""
         given = programs_to_begin_with(self.creature, settings, self.added)
         first = None if given is None else Trees(*map(jnp.asarray, given))
-        return program_variation(self.words, len(self.creature.joints.names), settings, first)
+        return program_variation(self.primitives, len(self.creature.joints.names), settings, first)
 
     def genes(self, genomes: Trees, settings: ProgramConfig) -> np.ndarray:
         """Codes and constants as they are, in no common unit."""
         code, value = (np.asarray(leaf) for leaf in (genomes.code, genomes.value))
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in (code, value)], axis=1)
 
-    def numbers(self, genomes: Trees) -> Mapping[str, np.ndarray]:
+    def genome_statistics(self, genomes: Trees) -> Mapping[str, np.ndarray]:
         """The nodes of all expressions."""
         return {"nodes": (np.asarray(genomes.code) != EMPTY).sum(axis=(1, 2))}
 
     def prepare(self, genome: Trees, settings: ProgramConfig) -> Listing:
         """See `Controller`."""
-        return listed(genome, self.words)
+        return listed(genome, self.primitives)
 
     def load(self, plan: Listing) -> jax.Array:
         """The number of functions in the longest expression."""
@@ -248,6 +248,6 @@ class Programs:
         seen = [
             senses[t.sense] if t.index is None else senses[t.sense][t.index] for t in self.known
         ]
-        angle = evaluator(self.words.functions)(plan, jnp.stack(seen))
+        angle = evaluator(self.primitives.functions)(plan, jnp.stack(seen))
         low, high = self.creature.joints.pose_low, self.creature.joints.pose_high
         return jnp.clip(angle, low.astype(np.float32), high.astype(np.float32)), memory

@@ -60,7 +60,7 @@ def canonical(code: jax.Array, value: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 
 @dataclasses.dataclass(frozen=True)
-class Words:
+class PrimitiveSet:
     """Primitives of a program. functions, senses: codes. capacity: C, most nodes."""
 
     functions: tuple[int, ...]
@@ -88,32 +88,36 @@ class Growing:
 
 
 def half_and_half(
-    key: jax.Array, words: Words, depth: tuple[int, int], constants: tuple[float, float]
+    key: jax.Array, primitives: PrimitiveSet, depth: tuple[int, int], constants: tuple[float, float]
 ) -> tuple[jax.Array, jax.Array]:
     """Draw a tree [C], full or grown with equal chance, up to a depth drawn from a range."""
     key_kind, key_depth, key_grow = jax.random.split(key, 3)
     least, most = depth
     deep = jax.random.randint(key_depth, (), least, most + 1)
     full = jax.random.bernoulli(key_kind)
-    return grown(key_grow, words, deep, jnp.where(full, deep, least), constants)
+    return grown(key_grow, primitives, deep, jnp.where(full, deep, least), constants)
 
 
 def grown(
-    key: jax.Array, words: Words, deep: jax.Array, least: jax.Array, constants: tuple[float, float]
+    key: jax.Array,
+    primitives: PrimitiveSet,
+    deep: jax.Array,
+    least: jax.Array,
+    constants: tuple[float, float],
 ) -> tuple[jax.Array, jax.Array]:
     """Draw a tree [C] with depth at most `deep` [] and terminals at depth `least` [] or more.
 
     Once the capacity is used up, every missing argument becomes a terminal.
     """
-    capacity = words.capacity
+    capacity = primitives.capacity
     begin = Growing(jnp.zeros(capacity, jnp.int32), jnp.int32(1), jnp.int32(0))
-    step = partial(_next_node, words, deep, least, constants)
+    step = partial(_next_node, primitives, deep, least, constants)
     _, (code, value) = jax.lax.scan(step, begin, jax.random.split(key, capacity))
     return canonical(code, value)
 
 
 def _next_node(
-    words: Words,
+    primitives: PrimitiveSet,
     deep: jax.Array,
     least: jax.Array,
     constants: tuple[float, float],
@@ -122,17 +126,17 @@ def _next_node(
 ) -> tuple[Growing, tuple[jax.Array, jax.Array]]:
     key_end, key_function, key_sense, key_value = jax.random.split(key, 4)
     alive, here = state.open > 0, state.pending[jnp.maximum(state.open - 1, 0)]
-    function = jax.random.choice(key_function, np.array(words.functions, np.int32))
+    function = jax.random.choice(key_function, np.array(primitives.functions, np.int32))
     wants = jnp.asarray(ARITY)[function]
-    room = state.used + state.open + wants <= words.capacity
+    room = state.used + state.open + wants <= primitives.capacity
     ends = (here >= deep) | ~room
-    ends |= (here >= least) & jax.random.bernoulli(key_end, words.terminal_share)
+    ends |= (here >= least) & jax.random.bernoulli(key_end, primitives.terminal_share)
     # A constant is as likely as any one observation.
-    end = jax.random.choice(key_sense, np.array([CONSTANT, *words.senses], np.int32))
+    end = jax.random.choice(key_sense, np.array([CONSTANT, *primitives.senses], np.int32))
     code = jnp.where(ends, end, function)
     value = jax.random.uniform(key_value, (), minval=constants[0], maxval=constants[1])
     given = jnp.where(ends, 0, wants)
-    places = np.arange(words.capacity)
+    places = np.arange(primitives.capacity)
     fresh = (places >= state.open - 1) & (places < state.open - 1 + given)
     after = Growing(
         jnp.where(fresh, here + 1, state.pending), state.open - 1 + given, state.used + 1
@@ -152,7 +156,7 @@ FINEST = 0.01
 
 
 def program_variation(
-    words: Words, joints: int, settings: ProgramConfig, first: Trees | None = None
+    primitives: PrimitiveSet, joints: int, settings: ProgramConfig, first: Trees | None = None
 ) -> Variation:
     """Return the operators. settings: `ProgramConfig`, plain or traced. first: see `Variation`."""
 
@@ -160,12 +164,12 @@ def program_variation(
         keys = jax.random.split(key, count * joints)
         make = partial(
             half_and_half,
-            words=words,
+            primitives=primitives,
             depth=settings.initial_depth,
             constants=settings.constants,
         )
         code, value = jax.vmap(lambda key: make(key))(keys)
-        shape = (count, joints, words.capacity)
+        shape = (count, joints, primitives.capacity)
         return Trees(code.reshape(shape), value.reshape(shape))
 
     def cross(key: jax.Array, mother: Trees, father: Trees) -> Trees:
@@ -178,7 +182,7 @@ def program_variation(
     def mutate(key: jax.Array, genome: Trees) -> Trees:
         key_joint, key_mutate = jax.random.split(key)
         joint = jax.random.randint(key_joint, (), 0, joints)
-        return _with(genome, joint, mutated(key_mutate, _of(genome, joint), words, settings))
+        return _with(genome, joint, mutated(key_mutate, _of(genome, joint), primitives, settings))
 
     def price(genomes: Trees) -> jax.Array:
         return jnp.asarray(settings.parsimony * jnp.sum(genomes.code != EMPTY, axis=(1, 2)))
@@ -197,18 +201,18 @@ def crossed(key: jax.Array, mother: Tree, father: Tree, settings: ProgramConfig)
     return spliced(mother, here, father, there, settings.depth)
 
 
-def mutated(key: jax.Array, tree: Tree, words: Words, settings: ProgramConfig) -> Tree:
+def mutated(key: jax.Array, tree: Tree, primitives: PrimitiveSet, settings: ProgramConfig) -> Tree:
     """Return the tree with one change; its kind is drawn by the weights of the settings."""
     key_kind, key_place, key_change = jax.random.split(key, 3)
     place = jax.random.randint(key_place, (), 0, jnp.maximum(size(tree[0]), 1))
     deep = jnp.int32(GRAFT)
-    graft = grown(key_change, words, deep, jnp.int32(0), settings.constants)
+    graft = grown(key_change, primitives, deep, jnp.int32(0), settings.constants)
     options = (
         spliced(tree, place, graft, jnp.int32(0), settings.depth),
-        _another(key_change, tree, place, words),
+        _another(key_change, tree, place, primitives),
         spliced((jnp.zeros_like(tree[0]), tree[1]), jnp.int32(0), tree, place, settings.depth),
         _moved(key_change, tree, settings),
-        _nudged(key_change, tree, place, words, settings),
+        _nudged(key_change, tree, place, primitives, settings),
     )
     kinds = ("subtree", "point", "hoist", "constant", "nudge")
     shares = jnp.stack([jnp.asarray(getattr(settings, kind), jnp.float32) for kind in kinds])
@@ -252,14 +256,14 @@ def spliced(
     return jnp.where(fits, code, host[0]), jnp.where(fits, value, host[1])
 
 
-def _another(key: jax.Array, tree: Tree, place: jax.Array, words: Words) -> Tree:
+def _another(key: jax.Array, tree: Tree, place: jax.Array, primitives: PrimitiveSet) -> Tree:
     """Return the tree with a node redrawn: a function of as many arguments, or an observation."""
-    functions = np.array(words.functions, np.int32)
+    functions = np.array(primitives.functions, np.int32)
     wanted = arity(tree[0])[place]
     key_function, key_sense = jax.random.split(key)
     alike = jnp.asarray(ARITY)[functions] == wanted
     function = functions_at(key_function, functions, alike)
-    sense = jax.random.choice(key_sense, np.array(words.senses, np.int32))
+    sense = jax.random.choice(key_sense, np.array(primitives.senses, np.int32))
     code = tree[0].at[place].set(jnp.where(wanted > 0, function, sense))
     return canonical(code, tree[1])
 
@@ -279,13 +283,13 @@ def _moved(key: jax.Array, tree: Tree, settings: ProgramConfig) -> Tree:
 
 
 def _nudged(
-    key: jax.Array, tree: Tree, place: jax.Array, words: Words, settings: ProgramConfig
+    key: jax.Array, tree: Tree, place: jax.Array, primitives: PrimitiveSet, settings: ProgramConfig
 ) -> Tree:
     """Return the tree with a small constant added to the subtree at a place [], or a factor near 1.
 
     The tree stays unchanged if the settings allow neither sums nor products.
     """
-    ways = [(code, at) for code, at in NEUTRAL.items() if code in words.functions]
+    ways = [(code, at) for code, at in NEUTRAL.items() if code in primitives.functions]
     if not ways:
         return tree
     key_way, key_by = jax.random.split(key)

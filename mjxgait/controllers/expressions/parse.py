@@ -15,7 +15,7 @@ from mjxgait.controllers.expressions.config import FUNCTIONS
 from mjxgait.controllers.expressions.text import (
     CONSTANT,
     FUNCTION_CODES,
-    LARGEST,
+    VALUE_LIMIT,
     Terminal,
 )
 from mjxgait.errors import UserError, did_you_mean
@@ -252,8 +252,8 @@ class Reader:
             raise self.wrong(
                 f'"{word}" is neither a sense nor a number; {did_you_mean(word, self.codes)}'
             )
-        if not abs(float(word)) <= LARGEST:
-            raise self.wrong(f"{word}: a constant must be within ±{LARGEST:g}")
+        if not abs(float(word)) <= VALUE_LIMIT:
+            raise self.wrong(f"{word}: a constant must be within ±{VALUE_LIMIT:g}")
         return CONSTANT, float(word)
 
     def _take(self) -> Word:

@@ -47,7 +47,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "sin": np.sin,
     "cos": np.cos,
 }
-MOST = 1e9
+VALUE_LIMIT = 1e9
 
 
 def read(text: str) -> Expression:
@@ -92,7 +92,7 @@ def value_of(expression: Expression, senses: Mapping[str, np.ndarray]) -> np.nda
     function, *arguments = expression
     value = FUNCTIONS[function](*[value_of(argument, senses) for argument in arguments])
     # np.clip takes three times as long for so few numbers.
-    return np.minimum(np.maximum(value, -MOST), MOST)
+    return np.minimum(np.maximum(value, -VALUE_LIMIT), VALUE_LIMIT)
 
 
 class ExpressionReference:

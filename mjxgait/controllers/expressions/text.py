@@ -20,7 +20,7 @@ FUNCTION_CODES = {name: FIRST_FUNCTION + i for i, name in enumerate(FUNCTIONS)}
 ARITY = np.zeros(FIRST_ADDED, np.int32)
 ARITY[FIRST_FUNCTION : FIRST_FUNCTION + len(FUNCTIONS)] = list(FUNCTIONS.values())
 """Number of arguments [32] by code; observations take none."""
-LEAST_DIVISOR, LARGEST = 1e-6, 1e9
+LEAST_DIVISOR, VALUE_LIMIT = 1e-6, 1e9
 """`/` returns 1 if the divisor is smaller than the first. Function values are clipped to ± the
 second, to stay finite.
 """
@@ -184,7 +184,7 @@ def folded(name: str, values: list[float]) -> float:
         "sin": lambda: math.sin(a),
         "cos": lambda: math.cos(a),
     }
-    return min(max(results[name](), -LARGEST), LARGEST)
+    return min(max(results[name](), -VALUE_LIMIT), VALUE_LIMIT)
 
 
 def _shorter(name: str, arguments: list[Expression]) -> Expression:

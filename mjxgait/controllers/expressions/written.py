@@ -20,6 +20,7 @@ from mjxgait.controllers.expressions.serialize import (
 from mjxgait.controllers.expressions.text import EMPTY, terminals
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.files import read_text
 from mjxgait.plugins.registry import find
 
 Program = tuple[np.ndarray, np.ndarray]
@@ -74,15 +75,7 @@ def programs_in(creature: Creature, file: Path, limits: Vocabulary) -> list[Prog
     Raises:
       UserError: names the file, and the line of a mistake.
     """
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise UserError(f"{file}: no such file") from None
-    except UnicodeDecodeError:
-        raise UserError(f"{file}: is not text in UTF-8; save it as such") from None
-    except OSError as error:
-        raise UserError(f"{file}: cannot be read ({error.strerror})") from None
-    return read_programs(text, creature.joints.names, limits, str(file))
+    return read_programs(read_text(file), creature.joints.names, limits, str(file))
 
 
 def check_programs(creature: Creature, config: Config) -> None:

@@ -151,7 +151,7 @@ class PoseTracker:
         """See `Controller`."""
         return in_ranges(genomes, Box(*self.bounds(settings)))
 
-    def numbers(self, genomes: Genome) -> Mapping[str, np.ndarray]:
+    def genome_statistics(self, genomes: Genome) -> Mapping[str, np.ndarray]:
         """Report no quantities."""
         return {}
 

@@ -14,6 +14,7 @@ from mjxgait.evolution.variation import (
     creation,
     jittered,
     narrowed,
+    uniform_crossover,
 )
 
 if TYPE_CHECKING:
@@ -34,11 +35,10 @@ def pose_variation(box: Box, config: EvolutionConfig) -> "Variation[Genome]":
 
     def cross(key: jax.Array, mother: "Genome", father: "Genome") -> "Genome":
         key_poses, key_tuning = jax.random.split(key)
-        from_mother = jax.random.bernoulli(key_tuning, 0.5, mother.tuning.shape)
         return dataclasses.replace(
             mother,
             key_poses=crossed_poses(key_poses, mother.key_poses, father.key_poses, config),
-            tuning=jnp.where(from_mother, mother.tuning, father.tuning),
+            tuning=uniform_crossover(key_tuning, mother.tuning, father.tuning),
         )
 
     def mutate(key: jax.Array, genome: "Genome") -> "Genome":

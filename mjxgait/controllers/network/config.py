@@ -7,7 +7,7 @@ from typing import Annotated
 import pydantic
 
 from mjxgait.config.tables import SHAPE, STRICT, Positive
-from mjxgait.controllers.config import holds
+from mjxgait.controllers.config import check_every
 
 JOINTS = ("joint_pos", "joint_vel")
 """Observations of every joint."""
@@ -58,6 +58,6 @@ class NetworkConfig:
         pydantic.Field(min_length=1),
         SHAPE,
     ] = (64, 64)
-    every: Annotated[int, pydantic.AfterValidator(holds), SHAPE] = 4
+    every: Annotated[int, pydantic.AfterValidator(check_every), SHAPE] = 4
     period: Positive = 0.5
     weight: Positive = 2.0

@@ -1,7 +1,7 @@
 """Brain of a grown body: its neurons, its wiring, and one control step.
 
-A neuron has one number of memory. Inputs are clipped to ±`LOUDEST`, values to ±`MOST`, so that
-nothing overflows.
+A neuron has one number of memory. Inputs are clipped to ±`INPUT_LIMIT`, values to ±`VALUE_LIMIT`,
+so that nothing overflows.
 
 Letters: `P` parts, `n` links, `K` neurons, `S` skills, `Q` and `M` as in `genotype`; `V` values:
 nothing (0), the constant 1, the angles, contacts and light of all links, and all neurons, part by
@@ -9,70 +9,94 @@ part, the central ones last. A part's contact and light are those of the link th
 block.
 """
 
+from collections.abc import Mapping
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.controllers.sims_brain.genotype import Centre, NerveRoom, Nerves
-from mjxgait.controllers.sims_brain.phenotype import Body
-from mjxgait.controllers.sims_brain.reference_body import INPUTS, SENSORS
+from mjxgait.controllers.sims_brain.phenotype import GrownBody
+from mjxgait.controllers.sims_brain.reference_body import INPUTS, NEURONS, SENSORS
 from mjxgait.physics.lane_major.lanes import sin_cos
 from mjxgait.types import pytree
 
-MOST, LOUDEST = 10.0, 100.0
+VALUE_LIMIT, INPUT_LIMIT = 10.0, 100.0
 SMALL = 1e-3
 """Smallest absolute divisor."""
 SMOOTHING = 5.0
 """1/s; rate at which a smoothing neuron follows its input."""
 
 
-def fired(
+def neuron_step(
     kind: jax.Array, inputs: jax.Array, memory: jax.Array, step: float
 ) -> tuple[jax.Array, jax.Array]:
     """Return outputs and memories [M] of neurons. inputs: [M, 3], weighted. step: s."""
-    a, b, c = (jnp.clip(inputs[:, i], -LOUDEST, LOUDEST) for i in range(3))
+    a, b, c = (jnp.clip(inputs[:, i], -INPUT_LIMIT, INPUT_LIMIT) for i in range(3))
+    kept = _memories(a, b, memory, step)
+    outputs = _outputs(a, b, c, memory, kept, step)
+    output, after = outputs[NEURONS[0]], memory
+    for number, name in enumerate(NEURONS[1:], start=1):
+        output = jnp.where(kind == number, outputs[name], output)
+    for name, value in kept.items():
+        after = jnp.where(kind == NEURONS.index(name), value, after)
+    return jnp.clip(output, -VALUE_LIMIT, VALUE_LIMIT), jnp.clip(after, -VALUE_LIMIT, VALUE_LIMIT)
+
+
+def _memories(a: jax.Array, b: jax.Array, memory: jax.Array, step: float) -> dict[str, jax.Array]:
+    """Return the next memory [M] of each function that has one."""
     integral, phase = memory + step * a, memory + step * b
     phase = phase - jnp.floor(phase)
-    followed = memory + (a - memory) * (1 - np.exp(-SMOOTHING * step))
-    kept = jnp.where(b > 0, a, memory)
-    turned = phase + a
+    return {
+        "integrate": integral,
+        "differentiate": a,
+        "smooth": memory + (a - memory) * (1 - np.exp(-SMOOTHING * step)),
+        "memory": jnp.where(b > 0, a, memory),
+        "oscillate-wave": phase,
+        "oscillate-saw": phase,
+    }
+
+
+def _outputs(
+    a: jax.Array,
+    b: jax.Array,
+    c: jax.Array,
+    memory: jax.Array,
+    kept: Mapping[str, jax.Array],
+    step: float,
+) -> dict[str, jax.Array]:
+    """Return the output [M] of each function. kept: see `_memories`."""
+    turned = kept["oscillate-wave"] + a
     wave = sin_cos(2 * np.pi * (turned - jnp.floor(turned)))[0]
     saw = 2 * (turned - jnp.floor(turned)) - 1
     sine, cosine = sin_cos(a)
     safe = jnp.where(jnp.abs(b) < SMALL, 1.0, b)
     logarithm = jnp.log(jnp.maximum(jnp.abs(a), SMALL))
-    outputs = [
-        a + b + c,
-        a * b * c,
-        jnp.where(jnp.abs(b) < SMALL, 0.0, a / safe),
-        jnp.where(a + b > c, 1.0, 0.0),
-        jnp.where(a > b, 1.0, 0.0),
-        jnp.sign(a),
-        jnp.minimum(a, b),
-        jnp.maximum(a, b),
-        jnp.abs(a),
-        jnp.where(a > 0, b, c),
-        a + (b - a) * jnp.clip(c, 0.0, 1.0),
-        sine,
-        cosine,
-        jnp.arctan(a),
-        logarithm,
-        jnp.exp(jnp.clip(b * logarithm, -MOST, np.log(MOST))),
-        jax.nn.sigmoid(a),
-        integral,
-        (a - memory) / step,
-        followed,
-        kept,
-        wave,
-        saw,
-    ]
-    memories = {17: integral, 18: a, 19: followed, 20: kept, 21: phase, 22: phase}
-    output, after = outputs[0], memory
-    for number, value in enumerate(outputs[1:], start=1):
-        output = jnp.where(kind == number, value, output)
-    for number, value in memories.items():
-        after = jnp.where(kind == number, value, after)
-    return jnp.clip(output, -MOST, MOST), jnp.clip(after, -MOST, MOST)
+    return {
+        "sum": a + b + c,
+        "product": a * b * c,
+        "divide": jnp.where(jnp.abs(b) < SMALL, 0.0, a / safe),
+        "sum-threshold": jnp.where(a + b > c, 1.0, 0.0),
+        "greater-than": jnp.where(a > b, 1.0, 0.0),
+        "sign-of": jnp.sign(a),
+        "min": jnp.minimum(a, b),
+        "max": jnp.maximum(a, b),
+        "abs": jnp.abs(a),
+        "if": jnp.where(a > 0, b, c),
+        "interpolate": a + (b - a) * jnp.clip(c, 0.0, 1.0),
+        "sin": sine,
+        "cos": cosine,
+        "atan": jnp.arctan(a),
+        "log": logarithm,
+        "expt": jnp.exp(jnp.clip(b * logarithm, -VALUE_LIMIT, np.log(VALUE_LIMIT))),
+        "sigmoid": jax.nn.sigmoid(a),
+        "integrate": kept["integrate"],
+        "differentiate": (a - memory) / step,
+        "smooth": kept["smooth"],
+        "memory": kept["memory"],
+        "oscillate-wave": wave,
+        "oscillate-saw": saw,
+    }
 
 
 NOTHING, ONE = 0, 1
@@ -105,7 +129,7 @@ def first_neuron(links: int) -> int:
     return 2 + links + links + 3 * links
 
 
-def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
+def wired(nerves: Nerves, centre: Centre, body: GrownBody, room: NerveRoom) -> Brain:
     """Return the wiring of a body. Wires from missing parts carry nothing."""
     parts, exists = body.parts, body.parts.exists
     count, node = len(exists), parts.node
@@ -135,7 +159,7 @@ def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
     )
 
 
-def _places(body: Body, room: NerveRoom) -> jax.Array:
+def _places(body: GrownBody, room: NerveRoom) -> jax.Array:
     """Return the index [P, codes] among the values of each part's sources."""
     parts, links = body.parts, len(body.part)
     count, local = len(parts.exists), room.local
@@ -176,7 +200,7 @@ TICKS = 2
 
 
 @pytree
-class Mind:
+class BrainMemory:
     """Memory of a brain: the neurons' values and memories, [K] each."""
 
     values: jax.Array
@@ -192,15 +216,15 @@ class Perceived:
     light: jax.Array
 
 
-def blank(neurons: int) -> Mind:
+def blank(neurons: int) -> BrainMemory:
     """Return the memory before the first step."""
     none = jnp.zeros(neurons)
-    return Mind(none, none)
+    return BrainMemory(none, none)
 
 
-def thought(
-    brain: Brain, mind: Mind, perceived: Perceived, step: float, skill: jax.Array | int = 0
-) -> tuple[jax.Array, Mind]:
+def brain_step(
+    brain: Brain, memory: BrainMemory, perceived: Perceived, step: float, skill: jax.Array | int = 0
+) -> tuple[jax.Array, BrainMemory]:
     """Return the torques [n] in N·m of the hinges, and the next memory. step: s per command.
 
     All neurons fire at once, on the values of the previous tick. skill: [] number of the effectors.
@@ -209,12 +233,12 @@ def thought(
     ends, angles = jnp.array([0.0, 1.0]), perceived.angles * brain.sign
     light = perceived.light * mirrored
     known = jnp.concatenate([ends, angles, perceived.contact, light.reshape(-1)])
-    values, memory = mind.values, mind.memory
+    values, inner = memory.values, memory.memory
     for _ in range(TICKS):
         inputs = jnp.concatenate([known, values])[brain.source] * brain.weight
-        values, memory = fired(brain.kind, inputs, memory, step / TICKS)
+        values, inner = neuron_step(brain.kind, inputs, inner, step / TICKS)
     wanted = brain.gain[skill] * jnp.concatenate([known, values])[brain.drive[skill]]
     if brain.steer is not None:
         added, factor = jnp.sum(brain.steer * light[brain.lit][:, None], axis=2).T
         wanted = wanted * (1 + factor) + added
-    return brain.pull * jnp.clip(wanted, -1.0, 1.0), Mind(values, memory)
+    return brain.pull * jnp.clip(wanted, -1.0, 1.0), BrainMemory(values, inner)

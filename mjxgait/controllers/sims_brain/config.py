@@ -13,7 +13,7 @@ from mjxgait.config.tables import (
     NonNegative,
     Positive,
 )
-from mjxgait.controllers.config import holds
+from mjxgait.controllers.config import check_every
 
 Room = Annotated[int, pydantic.Field(ge=1), SHAPE]
 
@@ -55,7 +55,7 @@ class BrainConfig:
     links: Annotated[int, pydantic.Field(ge=2), SHAPE] = 12
     local: Room = 3
     central: Room = 4
-    every: Annotated[int, pydantic.AfterValidator(holds), SHAPE] = 4
+    every: Annotated[int, pydantic.AfterValidator(check_every), SHAPE] = 4
     values: NonNegative = 8.0
     sigma: Positive = 0.2
     connect: Fraction = 0.5

@@ -11,10 +11,17 @@ import numpy as np
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.traced import Choice, chosen
 from mjxgait.controllers.base import Command, Senses
-from mjxgait.controllers.sims_brain.brain import Brain, Mind, Perceived, blank, thought, wired
+from mjxgait.controllers.sims_brain.brain import (
+    Brain,
+    BrainMemory,
+    Perceived,
+    blank,
+    brain_step,
+    wired,
+)
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.genotype import Capacity, NerveRoom, Ranges
-from mjxgait.controllers.sims_brain.operators import Genotype, Kin, Rates
+from mjxgait.controllers.sims_brain.operators import Genotype, GraphOperators, Rates
 from mjxgait.controllers.sims_brain.phenotype import body_of
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.creature.body import Body
@@ -70,15 +77,18 @@ class Brains:
             resize=settings.resize,
             strength=settings.strength,
         )
-        kin = Kin(self.capacity, self.room, Ranges(), rates)
+        operators = GraphOperators(self.capacity, self.room, Ranges(), rates)
 
         def create(key: jax.Array, count: int) -> Genotype:
-            return jax.vmap(kin.create)(jax.random.split(key, count))
+            return jax.vmap(operators.create)(jax.random.split(key, count))
 
         def cross(key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
             how, key = jax.random.split(key)
             draw = jax.random.uniform(how)
-            crossed, grafted = kin.cross(key, mother, father), kin.graft(key, mother, father)
+            crossed, grafted = (
+                operators.cross(key, mother, father),
+                operators.graft(key, mother, father),
+            )
             crosses, grafts = draw < settings.crossover, draw > 1 - settings.grafting
             child = jax.tree.map(
                 lambda own, c, g: jnp.where(crosses, c, jnp.where(grafts, g, own)),
@@ -89,7 +99,7 @@ class Brains:
             return kept(child, mother)
 
         def mutate(key: jax.Array, genotype: Genotype) -> Genotype:
-            return kept(kin.mutate(key, genotype), genotype)
+            return kept(operators.mutate(key, genotype), genotype)
 
         def kept(child: Genotype, mother: Genotype) -> Genotype:
             return _restricted(settings.evolves, child, mother)
@@ -102,7 +112,7 @@ class Brains:
         leaves = [np.asarray(leaf, float) for leaf in jax.tree.leaves(alone(genomes))]
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
-    def numbers(self, genomes: Genotype) -> Mapping[str, np.ndarray]:
+    def genome_statistics(self, genomes: Genotype) -> Mapping[str, np.ndarray]:
         """The number of parts, without tracing code that no program needs."""
         names = [field.name for field in dataclasses.fields(genomes.graph)]
         graph = {f"graph.{name}": np.asarray(getattr(genomes.graph, name)) for name in names}
@@ -120,18 +130,20 @@ class Brains:
     def load(self, plan: Brain) -> None:
         """Equal for all individuals."""
 
-    def init(self) -> Mind:
+    def init(self) -> BrainMemory:
         """See `Controller`."""
         return blank(self.capacity.parts * self.room.local + self.room.central)
 
-    def act(self, plan: Brain, memory: Mind, senses: Senses) -> tuple[jax.Array, Mind]:
+    def act(
+        self, plan: Brain, memory: BrainMemory, senses: Senses
+    ) -> tuple[jax.Array, BrainMemory]:
         """Torques in N·m of the links' hinges, without the root."""
         links = self.capacity.links
         light = senses[LIGHT] if LIGHT in self.reads else jnp.zeros((links, 3))
         angles = jnp.concatenate([jnp.zeros(1), senses["joint_pos"]])
         perceived = Perceived(angles, senses["contact"], light)
         skill = senses[SKILL] if SKILL in self.reads else self.skill
-        torque, memory = thought(plan, memory, perceived, self.pause, skill)
+        torque, memory = brain_step(plan, memory, perceived, self.pause, skill)
         return torque[1:], memory
 
 

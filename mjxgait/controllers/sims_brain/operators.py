@@ -63,7 +63,7 @@ class Rates:
 
 
 @dataclasses.dataclass(frozen=True)
-class Kin:
+class GraphOperators:
     """Operators and limits that all genotypes of a population share."""
 
     capacity: Capacity

@@ -8,21 +8,21 @@ from mjxgait.controllers.sims_brain.brain import wired
 from mjxgait.controllers.sims_brain.controller import LIGHT, Brains, directions
 from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
 from mjxgait.controllers.sims_brain.operators import Genotype
-from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.phenotype import GrownBody, body_of
 from mjxgait.controllers.sims_brain.reference_body import (
     CUBE,
     CUBE_DENSITY,
     DISTANCE,
     HALF_A_TURN,
 )
-from mjxgait.creature.body import Body as Facts
+from mjxgait.creature.body import Body
 from mjxgait.physics.batched_trees.arena import Act, Arena, cube_tree, reach, resting
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Tree
 from mjxgait.types import Sensed
 
 
-def acting(controller: Brains, body: Facts) -> Act:
+def acting(controller: Brains, body: Body) -> Act:
     """Return the function by which the opponent acts. The cube is its light."""
 
     def act(brain: object, mind: object, sensed: Sensed) -> tuple[jax.Array, object]:
@@ -33,7 +33,7 @@ def acting(controller: Brains, body: Facts) -> Act:
     return act
 
 
-def grown_both(own: Graph, other: Graph, capacity: Capacity) -> tuple[Body, Body]:
+def grown_both(own: Graph, other: Graph, capacity: Capacity) -> tuple[GrownBody, GrownBody]:
     """Return the bodies that grow from two graphs. In one go, which halves the compilation."""
     both = jax.tree.map(lambda a, b: jnp.stack([a, b]), own, other)
     bodies = jax.vmap(lambda graph: body_of(graph, capacity))(both)

@@ -21,7 +21,7 @@ TURNS_ABOUT = np.array([(*axes, *[2] * (3 - len(axes))) for axes in AXES])
 
 
 @pytree
-class Body:
+class GrownBody:
     """Phenotype. part: [n] part of a link. hinge: [n] index of its hinge in the part.
 
     strength: [n] N·m. sign: [n], -1 if the angle is that of a mirror image.
@@ -35,7 +35,7 @@ class Body:
     sign: jax.Array
 
 
-def body_of(graph: Graph, capacity: Capacity) -> Body:
+def body_of(graph: Graph, capacity: Capacity) -> GrownBody:
     """Return the body that grows from a graph."""
     parts = grown(graph, capacity)
     kind, counts = graph.joint[parts.node], jnp.asarray(HINGES)
@@ -63,7 +63,7 @@ def body_of(graph: Graph, capacity: Capacity) -> Body:
     axis = jnp.asarray(TURNS_ABOUT)[kind[part], hinge]
     # Blocks are mirrored along y, and a turn about y is its own mirror image.
     sign = 1.0 - 2.0 * parts.copies[part] * (axis != 1)
-    return Body(parts, weighed(tree), part, hinge, strength, sign)
+    return GrownBody(parts, weighed(tree), part, hinge, strength, sign)
 
 
 def _frames(kind: jax.Array, hinge: jax.Array) -> jax.Array:

@@ -25,7 +25,7 @@ CENTRE = -1
 LIGHT = (4, 5, 6)
 """Numbers of a part's three sensors of light; see `BrainReference._sensor`."""
 TICKS = 2
-MOST, LOUDEST = 10.0, 100.0
+VALUE_LIMIT, INPUT_LIMIT = 10.0, 100.0
 Neuron = tuple[int, int]
 Values = Any
 """Array [S, ...] of neurons of one kind."""
@@ -64,7 +64,7 @@ FUNCTIONS: Mapping[str, Callable[..., Values]] = {
     "cos": lambda a, b, c, m, dt: np.cos(a),
     "atan": lambda a, b, c, m, dt: np.arctan(a),
     "log": lambda a, b, c, m, dt: _log(a),
-    "expt": lambda a, b, c, m, dt: np.exp(np.clip(b * _log(a), -MOST, np.log(MOST))),
+    "expt": lambda a, b, c, m, dt: np.exp(np.clip(b * _log(a), -VALUE_LIMIT, np.log(VALUE_LIMIT))),
     "sigmoid": lambda a, b, c, m, dt: 1 / (1 + np.exp(-a)),
     "integrate": lambda a, b, c, m, dt: m + dt * a,
     "differentiate": lambda a, b, c, m, dt: (a - m) / dt,
@@ -87,10 +87,10 @@ KEPT: Mapping[str, Callable[..., Values]] = {
 
 def fire(kind: str, inputs: Sequence[Values], memory: Values, dt: float) -> tuple[Values, Values]:
     """Return a neuron's output and memory. dt: s of a tick."""
-    a, b, c = (np.clip(x, -LOUDEST, LOUDEST) for x in inputs)
+    a, b, c = (np.clip(x, -INPUT_LIMIT, INPUT_LIMIT) for x in inputs)
     kept = KEPT[kind](a, b, c, memory, dt) if kind in KEPT else memory
     output = FUNCTIONS[kind](a, b, c, memory, dt)
-    return np.clip(output, -MOST, MOST), np.clip(kept, -MOST, MOST)
+    return np.clip(output, -VALUE_LIMIT, VALUE_LIMIT), np.clip(kept, -VALUE_LIMIT, VALUE_LIMIT)
 
 
 class BrainReference:

@@ -39,7 +39,7 @@ ROTOR = 0.01
 """s: a hinge's armature over its damping, so that the smallest blocks can be simulated."""
 GRAVITY, FRICTION = 9.81, 0.9
 """m/s², and friction of the ground; neither acts in water."""
-HARDEST = 2.0
+CONTACT_TIME_CONSTANT = 2.0
 """Contact time constant (`solref`) in steps: the smallest that MuJoCo simulates as given."""
 DRAG = 500.0
 """N·s/m³; drag of water on a face per area and normal velocity."""

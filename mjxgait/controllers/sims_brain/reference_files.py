@@ -8,13 +8,13 @@ import numpy as np
 import tomli_w
 
 from mjxgait.controllers.sims_brain.reference_body import (
+    CONTACT_TIME_CONSTANT,
     CUBE,
     CUBE_DENSITY,
     DAMPING,
     DENSITY,
     DISTANCE,
     HALF_A_TURN,
-    HARDEST,
     ROTOR,
     THEIRS,
     Part,
@@ -53,7 +53,7 @@ def body_xml(
     world = ET.SubElement(root, "worldbody")
     sticking = {}
     if friction is not None:
-        hard = {"solref": in_xml((HARDEST * step, 1.0))}
+        hard = {"solref": in_xml((CONTACT_TIME_CONSTANT * step, 1.0))}
         sticking = {"friction": in_xml((friction, SPIN, ROLL)), **hard}
     touched = "0" if friction is None else "1"
     plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": touched}

@@ -17,7 +17,7 @@ from mjxgait.controllers.sims_brain.reference_body import (
 )
 from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.kinds import in_water
 
 
@@ -70,4 +70,4 @@ class GraphSerializer(PlainSerializer[BrainConfig]):
             around="in water" if wet else "on land",
             opponent=grow(theirs, settings.parts, settings.links) if theirs else (),
         )
-        return load_files(files)
+        return creature_of(files)

@@ -18,7 +18,7 @@ DIRECTIONS = {
     "rough": (),
 }
 """Directions of each kind but `flat`; the first is the default."""
-MOST = {"slope": 1.0, "steps": 0.5, "bumps": 0.5, "rough": 0.5}
+MAX_SIZE = {"slope": 1.0, "steps": 0.5, "bumps": 0.5, "rough": 0.5}
 """The largest size of each kind."""
 ALLOWED = (
     "give flat, slope:S, steps:S, bumps:S or rough:S; S is the rise per metre of a slope (at most "
@@ -83,7 +83,7 @@ def parse_ground(text: str) -> GroundSpec:
         raise ValueError(f'"{text}" is no ground: {ALLOWED}')
     kind, known = found["kind"], DIRECTIONS[found["kind"]]
     size, direction = _number(found["size"]), found["direction"] or (known or ("",))[0]
-    if not 0 < size <= MOST[kind]:
+    if not 0 < size <= MAX_SIZE[kind]:
         raise ValueError(f'"{text}": {found["size"]} is no size of {kind}: {ALLOWED}')
     if direction not in known and direction:
         raise ValueError(f'"{text}": {kind} has no direction "{direction}": {ALLOWED}')

@@ -18,13 +18,14 @@ from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion, by_skill, read_champion
 from mjxgait.creature import Creature, load_creature
+from mjxgait.errors import UserError
 from mjxgait.experiments.ablation.plan import Plan, Run, Study
 from mjxgait.experiments.ablation.rows import GROUPS, champion_path
 from mjxgait.plugins.user_code import load_all, loaded
 from mjxgait.processes import process_per_core, survivable
 from mjxgait.reference.starts import join, nominal_starts, perturbed_starts
 from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import CREATURE, METRICS
+from mjxgait.training.folder import CREATURE, METRICS, command
 from mjxgait.training.logs import Line, append_lines, read_metrics, read_records, write_lines
 from mjxgait.training.stored import is_number
 
@@ -102,10 +103,17 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
     for line in read_logs(folder):
         lines.setdefault((line["variant"], line["seed"]), []).append(line)
     missing = [run for run in plan.runs if (run.variant, run.seed) not in known]
-    if missing:
-        tell(0, len(missing))
+    lost = next((run for run in plan.runs if (run.variant, run.seed) not in lines), None)
+    if lost is not None:
+        raise UserError(
+            f"{folder}: no log of {lost.variant}, seed {lost.seed}; take its metrics from a copy, or "
+            "remove its champion, and the run is made anew"
+        )
+    if not missing:
+        return [known[run.variant, run.seed] for run in plan.runs]
+    tell(0, len(missing))
     prepare = partial(load_all, loaded())
-    again = f"mjxgait ablate --resume {folder}"
+    again = command("ablate", "--resume", folder, run=folder)
     with survivable(folder, again), process_per_core(len(missing), prepare) as pool:
         found = pool.map(
             partial(_evaluate, folder / CREATURE, plan.study.grounds, plan.study.certify),

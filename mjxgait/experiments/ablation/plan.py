@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import pydantic
 
 from mjxgait.config.evolution import AncestorsConfig
-from mjxgait.config.layers import data_folder
+from mjxgait.config.layers import data_folder, find_file
 from mjxgait.config.schema import Config, GroundText, Physics
 from mjxgait.config.tables import (
     STRICT,
@@ -19,6 +19,7 @@ from mjxgait.config.tables import (
     Seed,
     Table,
     Whole,
+    as_table,
     build,
     merge,
     not_none,
@@ -26,7 +27,7 @@ from mjxgait.config.tables import (
 )
 from mjxgait.creature import Creature
 from mjxgait.creature.ground.spec import FLAT
-from mjxgait.errors import UserError, did_you_mean
+from mjxgait.errors import UserError
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import WalkTargets, with_targets
 from mjxgait.training.folder import check_parts
@@ -97,7 +98,7 @@ class Study:
 
     def __post_init__(self) -> None:
         if bool(self.variant) == bool(self.grid):
-            raise ValueError("give either [[variant]] tables or a [grid], not both and not neither")
+            raise ValueError("give [[variant]] tables or a [grid], one of the two")
         if not self.grounds or len(set(self.grounds)) < len(self.grounds):
             raise ValueError("grounds must name at least one ground, and none twice")
         if self.measure == "certified" and not self.certify:
@@ -142,7 +143,7 @@ def read_study(file: Path, over: Mapping[str, object]) -> Study:
     Raises:
       UserError: names the file and the key.
     """
-    path = _find(file)
+    path = find_file(file, data_folder("configs") / "ablations", "study")
     given = build(Study, read_toml(path), str(path))
     study = build(Study, merge(dataclasses.asdict(given), not_none(**over)), str(path))
     scale = (study.generations + 1) / (given.generations + 1)
@@ -198,16 +199,19 @@ def check_variants(plan: Plan, creature: Creature, where: str) -> None:
       UserError: names the variant and says why; see `check_parts`.
     """
     for variant in plan.variants:
-        with _told_of(f'{where}: variant "{variant}"'):
+        with _located(f'{where}: variant "{variant}"'):
             check_parts(creature, plan.of(variant)[0].config)
 
 
 def _config(study: Study, table: VariantTable, creature: Creature, where: str) -> Config:
     """Return the config of a variant's runs, without their seeds."""
     here = f'{where}: variant "{table.name}"'
-    use = {**study.base.get("use", {}), **table.settings.get("use", {})}
+    use = {
+        **as_table(study.base.get("use", {}), f"{where}: [base] use"),
+        **as_table(table.settings.get("use", {}), f"{here}: use"),
+    }
     file = table.config or study.config
-    with _told_of(here):
+    with _located(here):
         config = resolve_config(
             creature.settings.train, creature.name, Path(file) if file else None, use
         )
@@ -216,13 +220,13 @@ def _config(study: Study, table: VariantTable, creature: Creature, where: str) -
     config = _lay(config, table.settings, here)
     if study.physics is not None:
         config = _lay(config, {"rollout": {"physics": study.physics}}, where)
-    with _told_of(here):
+    with _located(here):
         config = with_targets(config, creature, WalkTargets(gait=table.gait))
     return _settled(config, table.generations or study.generations)
 
 
 @contextlib.contextmanager
-def _told_of(where: str) -> Iterator[None]:
+def _located(where: str) -> Iterator[None]:
     """Prefix a `UserError` with its place."""
     try:
         yield
@@ -242,11 +246,12 @@ def _settled(config: Config, generations: int) -> Config:
 
 
 def _lay(config: Config, table: Table, where: str) -> Config:
-    if "seed" in table or "generations" in table.get("evolution", {}):
+    evolution = as_table(table.get("evolution", {}), f"{where}: evolution")
+    if "seed" in table or "generations" in evolution:
         raise UserError(
             f"{where}: seeds and generations are the study's own keys, not settings of a variant"
         )
-    if "ancestors" in table.get("evolution", {}):
+    if "ancestors" in evolution:
         raise UserError(
             f"{where}: runs of a study begin with drawn individuals, not with ancestors"
         )
@@ -287,16 +292,3 @@ def _most_steps(run: Run, creature: Creature) -> int:
     seeding = -(-evolution.population // evolution.offspring)
     episodes = (run.generations + seeding) * evolution.offspring * rollout.starts
     return episodes * round(rollout.seconds / creature.model.opt.timestep)
-
-
-def _find(file: Path) -> Path:
-    folder = data_folder("configs") / "ablations"
-    shipped = folder / f"{file}.toml"
-    if file.exists():
-        return file
-    if shipped.exists():
-        return shipped
-    known = sorted(path.stem for path in folder.glob("*.toml"))
-    raise UserError(
-        f"{file}: no such file and no shipped study of that name; {did_you_mean(str(file), known)}"
-    )

@@ -27,7 +27,7 @@ TIMES = ("wall_s", "steps_per_second")
 
 
 class News(TypedDict, total=False):
-    """Progress of a group: `compiling` runs side by side, or all the rest.
+    """Message on a group: `compiling` alone, the number of its runs, or all other keys.
 
     generation, of: reached, and the last. generations, seconds, steps: of what was just done.
     """

@@ -9,11 +9,13 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import pydantic
 
 from mjxgait.config.schema import Config
-from mjxgait.config.tables import STRICT, build, dump_toml, read_toml
+from mjxgait.config.tables import STRICT, Positive, build, dump_toml, read_toml
 from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import Advanced
 from mjxgait.distributed.rows import Rows, RowsProgress
@@ -55,8 +57,8 @@ class Grid:
     """
 
     __pydantic_config__ = STRICT
-    speeds: tuple[float, ...]
-    turns: tuple[float, ...] = ()
+    speeds: Annotated[tuple[Positive, ...], pydantic.Field(min_length=1)]
+    turns: tuple[Annotated[float, pydantic.Field(gt=0, lt=360)], ...] = ()
 
     @classmethod
     def of(cls, speeds: Sequence[float], turns: Sequence[float]) -> "Grid":

@@ -27,7 +27,7 @@ from mjxgait.reference.changing import ChangingReference
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.walk import WARMUP
-from mjxgait.training.folder import open_champion
+from mjxgait.training.folder import command, open_champion
 
 Pair = tuple[Cell, Cell]
 Tried = TypeVar("Tried")
@@ -60,7 +60,7 @@ def of_each(
     Raises:
       UserError: a process was killed from outside.
     """
-    again = f"mjxgait repertoire --resume {folder}"
+    again = command("repertoire", "--resume", folder, run=folder)
     tried = one_per_core(partial(work, folder), pairs, tell, folder=folder, again=again)
     return tried or []
 

@@ -4,8 +4,7 @@ It supports trees of bodies with spheres and capsules that touch one floor. Anyt
 `UnsupportedModel`.
 """
 
-from mjxgait.physics.lane_major.lanes import one_kernel
 from mjxgait.physics.lane_major.model import UnsupportedModel
 from mjxgait.physics.lane_major.plant import LaneMajorPlant, lane_major_plant
 
-__all__ = ["LaneMajorPlant", "UnsupportedModel", "lane_major_plant", "one_kernel"]
+__all__ = ["LaneMajorPlant", "UnsupportedModel", "lane_major_plant"]

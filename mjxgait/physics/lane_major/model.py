@@ -32,7 +32,7 @@ class UnsupportedModel(Exception):
 
 
 def check_supported(model: mujoco.MjModel) -> list[tuple[int, int]]:
-    """Pairs (floor, geom) of geoms that may touch.
+    """Return the pairs (floor, geom) of geoms that may touch.
 
     Raises:
       UnsupportedModel: the lane-major physics does not support the model.

@@ -102,7 +102,7 @@ class LaneMajorPlant:
             other = lane_major_plant(model, layout, crossings, padded=self.topology.open_pairs)
             reason = difference(self.topology, other.topology)
         except UnsupportedModel as error:
-            reason = f"the fast physics does not know this: {error}"
+            reason = f"the fast physics does not support this: {error}"
         if reason:
             raise OtherTopology(reason)
         return other.parameters

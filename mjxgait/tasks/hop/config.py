@@ -1,4 +1,4 @@
-"""Settings of the tasks hop and travel."""
+"""Settings of the tasks hop, limbo and travel."""
 
 import dataclasses
 from typing import Annotated

@@ -114,14 +114,16 @@ class HopCriteria(GoalCriteria):
         left = away(starts.goal[:, None], outcome.path, outcome.aside)
         return outcome.stayed_up & (farthest(left, starts.goal, frames) <= wanted.near)
 
-    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+    def lost(
+        self, outcome: Outcome, starts: Starts, steps: int, config: CertificateConfig
+    ) -> np.ndarray:
         """Down, or away from the goal at a time that counts."""
-        wanted = self.wanted(CertificateConfig())
+        wanted = self.wanted(config)
         frames = frames_in(wanted.stay, outcome.trajectory.time_step)
         due = slice(outcome.path.shape[1] - frames, steps)
         goal = starts.goal[:, None]
         outside = away(goal, outcome.path[:, due], outcome.aside[:, due]) > wanted.near * goal
-        return super().lost(outcome, starts, steps) | outside.any(1)
+        return super().lost(outcome, starts, steps, config) | outside.any(1)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, object]:
         """Distance from the goal at the end, and time of the final arrival."""
@@ -214,10 +216,12 @@ class LimboCriteria(HopCriteria):
         clear: np.ndarray = outcome.clearance > config.limbo.clearance
         return super().succeeded(outcome, starts, config) & clear
 
-    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+    def lost(
+        self, outcome: Outcome, starts: Starts, steps: int, config: CertificateConfig
+    ) -> np.ndarray:
         """Lost hops, and any contact with the bar."""
-        touched = outcome.clearance <= CertificateConfig().limbo.clearance
-        return super().lost(outcome, starts, steps) | touched
+        touched = outcome.clearance <= config.limbo.clearance
+        return super().lost(outcome, starts, steps, config) | touched
 
     def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
         """Evaluate criteria 1, 2 and 3."""

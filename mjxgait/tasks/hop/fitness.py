@@ -10,7 +10,7 @@ from mjxgait.creature.body import Body
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.config import NEAR, HopConfig, HopWeights, TravelConfig, TravelWeights
 from mjxgait.tasks.hop.stats import HopStats, away
-from mjxgait.tasks.terms import cost_of_transport, crossed, ramped
+from mjxgait.tasks.terms import cost_of_transport, overlap_cost, ramped
 
 TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
 GOAL = "distance"
@@ -68,7 +68,7 @@ def style_terms(creature: Body, horizon: int, stats: HopStats) -> dict[str, jax.
         "fall": jnp.where(stats.reason == Reason.FINISHED, 0.0, 1.0),
         "fast": jnp.clip(stats.fastest / FASTEST - FAST, 0.0, 1.0 - FAST) / (1.0 - FAST),
         "neutral": jnp.minimum(jnp.mean(stats.bent / jnp.maximum(half_range, 1e-6)), 1.0),
-        "overlap": crossed(creature, stats.overlap),
+        "overlap": overlap_cost(creature, stats.overlap),
     }
     if stats.work is not None:
         way = jnp.maximum(stats.goal - stats.left, SHORTEST * creature.frame.body_length)

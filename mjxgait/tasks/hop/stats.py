@@ -35,7 +35,7 @@ class HopStats(EpisodeStats):
     fastest: [] rad/s, of all joints.
     still: [] steps since the latest motion.
     work: [] J of the joints; None if it has no weight.
-    closest: [G] m, smallest distance to each sub-goal; None without sub-goals.
+    closest: [U] m, smallest distance to each sub-goal; None without sub-goals.
     """
 
     goal: jax.Array
@@ -129,7 +129,7 @@ def with_extras(
 ) -> HopStats:
     """Add the statistics that only some settings count: work, and distances to sub-goals.
 
-    torque: [J] N·m. step: s. sub_goals: [G] shares of the straight way to the goal.
+    torque: [J] N·m. step: s. sub_goals: [U] shares of the straight way to the goal.
     """
     if stats.work is not None:
         done = stats.work + positive_work(torque, sensed, step)

@@ -126,7 +126,9 @@ class Hop(PlainTask):
         }
 
     @override
-    def weights(self, settings: HopConfig, generation: jax.Array) -> dict[str, jax.Array]:
+    def weights(
+        self, settings: HopConfig | TravelConfig, generation: jax.Array
+    ) -> dict[str, jax.Array]:
         return signed_weights(settings, generation)
 
 
@@ -195,12 +197,6 @@ class Travel(Hop):
             "way": self._way(stats),
             "seconds": stats.steps * self.step,
         }
-
-    @override
-    def weights(
-        self, settings: HopConfig | TravelConfig, generation: jax.Array
-    ) -> dict[str, jax.Array]:
-        return signed_weights(settings, generation)
 
     def _way(self, stats: HopStats) -> jax.Array:
         return jnp.where(stats.steps > 0, stats.goal - stats.left, 0.0)

@@ -41,7 +41,7 @@ its height. At the cost of walking no jump above a tenth of a metre would be wor
 """
 
 
-def own(sensed: Sensed) -> ModularSensed:
+def modular_sensed(sensed: Sensed) -> ModularSensed:
     """Return the quantities that only modular bodies have."""
     assert isinstance(sensed.body, ModularSensed)
     return sensed.body
@@ -98,7 +98,9 @@ class ModularTask(PlainTask):
     def ended(self, sensed: Sensed, goal: object) -> jax.Array:
         speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
         wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
-        return jnp.where(wild | (own(sensed).limit_excess > FURTHEST), WILD, Reason.FINISHED)
+        return jnp.where(
+            wild | (modular_sensed(sensed).limit_excess > FURTHEST), WILD, Reason.FINISHED
+        )
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
         """The first term is a reward, all others are penalties.
@@ -149,9 +151,9 @@ class LocomotionTask(ModularTask):
         return dataclasses.replace(
             stats,
             steps=stats.steps + 1,
-            settled=jnp.where(stats.steps <= params, own(sensed).com, stats.settled),
-            halfway=jnp.where(stats.steps <= half, own(sensed).com, stats.halfway),
-            place=own(sensed).com,
+            settled=jnp.where(stats.steps <= params, modular_sensed(sensed).com, stats.settled),
+            halfway=jnp.where(stats.steps <= half, modular_sensed(sensed).com, stats.halfway),
+            place=modular_sensed(sensed).com,
         )
 
     def curved(self, stats: LocomotionStats) -> jax.Array:
@@ -180,6 +182,6 @@ def length(vector: jax.Array) -> jax.Array:
     return jnp.sqrt(jnp.sum(vector * vector))
 
 
-def lost(much: jax.Array) -> jax.Array:
+def share_lost(much: jax.Array) -> jax.Array:
     """Share lost to a flaw of this size; one half at 1."""
     return 1 - 1 / (1 + much * much)

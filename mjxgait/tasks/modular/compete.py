@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from typing_extensions import override
 
 from mjxgait.controllers.sims_brain.controller import directions
-from mjxgait.tasks.modular.base import LITTLE, lost, own
+from mjxgait.tasks.modular.base import LITTLE, modular_sensed, share_lost
 from mjxgait.tasks.modular.config import CompeteConfig, CompeteWeights
 from mjxgait.tasks.modular.roam import Roam, RoamStats, shaken
 from mjxgait.types import Sensed, pytree
@@ -61,7 +61,7 @@ class Compete(Roam):
     def evaluate(self, stats: Any, settings: Any) -> Mapping[str, jax.Array]:
         """The share of the cube; its loss by overlap, and of the rest by vibration."""
         share = self._share(stats)
-        inside = lost(stats.overlap / settings.overlap)
+        inside = share_lost(stats.overlap / settings.overlap)
         vibrates = (1 - inside) * shaken(stats, settings.vibration)
         return {"share": share, "overlap": share * inside, "vibration": share * vibrates}
 
@@ -84,11 +84,11 @@ class Compete(Roam):
         return jnp.where(stats.moved > 0, mean, 0.0)
 
     def _cube(self, sensed: Sensed) -> jax.Array:
-        cube = own(sensed).cube
+        cube = modular_sensed(sensed).cube
         assert cube is not None
         return cube
 
     def _gaps(self, sensed: Sensed) -> jax.Array:
-        gaps = own(sensed).gaps
+        gaps = modular_sensed(sensed).gaps
         assert gaps is not None
         return gaps

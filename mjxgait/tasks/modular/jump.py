@@ -12,8 +12,8 @@ from mjxgait.tasks.base import EpisodeStats
 from mjxgait.tasks.modular.base import (
     SHARPNESS,
     ModularTask,
-    lost,
-    own,
+    modular_sensed,
+    share_lost,
 )
 from mjxgait.tasks.modular.config import JumpConfig, JumpWeights
 from mjxgait.types import Sensed, pytree
@@ -70,7 +70,9 @@ class Jump(ModularTask):
             stats,
             steps=stats.steps + 1,
             reason=jnp.where(lies, LYING, stats.reason),
-            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, own(sensed).depth)),
+            overlap=jnp.where(
+                begins, stats.overlap, jnp.maximum(stats.overlap, modular_sensed(sensed).depth)
+            ),
             heights=jnp.where(now, jnp.maximum(stats.heights, low), stats.heights),
         )
 
@@ -81,7 +83,7 @@ class Jump(ModularTask):
         and a body that lies still does not jump again.
         """
         height = jnp.mean(stats.heights)
-        inside = lost((stats.overlap / settings.overlap) ** SHARPNESS)
+        inside = share_lost((stats.overlap / settings.overlap) ** SHARPNESS)
         lived = (1 - inside) * stats.steps / self.horizon
         return {
             "height": height,

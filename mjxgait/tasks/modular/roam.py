@@ -13,8 +13,8 @@ from mjxgait.tasks.modular.base import (
     SHARPNESS,
     LocomotionStats,
     LocomotionTask,
-    lost,
-    own,
+    modular_sensed,
+    share_lost,
 )
 from mjxgait.tasks.modular.config import RoamConfig, RoamWeights
 from mjxgait.types import Sensed, pytree
@@ -66,7 +66,9 @@ class Roam(LocomotionTask):
         changes = sensed.joint_vel - stats.joint_vel
         return dataclasses.replace(
             super().update(stats, sensed, torque, params, goal),
-            overlap=jnp.where(begins, stats.overlap, jnp.maximum(stats.overlap, own(sensed).depth)),
+            overlap=jnp.where(
+                begins, stats.overlap, jnp.maximum(stats.overlap, modular_sensed(sensed).depth)
+            ),
             upwards=upwards,
             upright=jnp.where(begins, 1.0, jnp.minimum(stats.upright, upright)),
             joint_vel=sensed.joint_vel,
@@ -81,9 +83,9 @@ class Roam(LocomotionTask):
         """
         speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
-        inside = lost(stats.overlap / settings.overlap)
+        inside = share_lost(stats.overlap / settings.overlap)
         tilt = jnp.degrees(jnp.arccos(jnp.clip(stats.upright, -1.0, 1.0)))
-        tipped = (1 - inside) * lost(tilt / settings.tilt)
+        tipped = (1 - inside) * share_lost(tilt / settings.tilt)
         vibrates = (1 - inside - tipped) * shaken(stats, settings.vibration)
         return {
             "speed": speed,
@@ -97,4 +99,4 @@ class Roam(LocomotionTask):
 def shaken(stats: RoamStats, half: jax.Array | float) -> jax.Array:
     """Share [] lost by joints that vibrate; half: vibration at which it is one half."""
     vibration = jnp.sqrt(stats.jerked / jnp.maximum(stats.moved, LITTLE))
-    return lost((vibration / half) ** SHARPNESS)
+    return share_lost((vibration / half) ** SHARPNESS)

@@ -15,8 +15,10 @@ from mjxgait.tasks.modular.criteria import SwimCriteria
 
 
 class SkillsCriteria(SwimCriteria):
-    """Implementation of `AcceptanceCriteria`. task: one with skills, of which swimming is first.
-    each: the criteria of the skills, in their order.
+    """Implementation of `AcceptanceCriteria`.
+
+    task: one with skills, of which swimming is first. each: the criteria of the skills, in their
+    order.
     """
 
     def __init__(self, task: str, verdict: str) -> None:

@@ -13,8 +13,8 @@ from mjxgait.tasks.modular.base import (
     LocomotionStats,
     LocomotionTask,
     length,
-    lost,
-    own,
+    modular_sensed,
+    share_lost,
 )
 from mjxgait.tasks.modular.config import SwimConfig, SwimWeights
 from mjxgait.types import Sensed, pytree
@@ -54,8 +54,8 @@ class Swim(LocomotionTask):
     ) -> SwimStats:
         begins, momentum, push = (
             stats.steps <= params,
-            own(sensed).momentum,
-            own(sensed).water_force * self.step,
+            modular_sensed(sensed).momentum,
+            modular_sensed(sensed).water_force * self.step,
         )
         began = jnp.where(begins, momentum, stats.began)
         given = jnp.where(begins, 0.0, stats.given)
@@ -74,9 +74,9 @@ class Swim(LocomotionTask):
         """The speed; its loss by overlap, of the rest by foreign momentum, of that by curves."""
         speed = self.speed(stats, settings)
         earned = jnp.maximum(speed, 0.0)
-        inside = lost(stats.overlap / settings.overlap)
+        inside = share_lost(stats.overlap / settings.overlap)
         share = stats.lacking / jnp.maximum(stats.exchanged, LITTLE)
-        elsewhere = (1 - inside) * lost(share / settings.elsewhere)
+        elsewhere = (1 - inside) * share_lost(share / settings.elsewhere)
         curve = (1 - inside - elsewhere) * self.curved(stats)
         return {
             "speed": speed,

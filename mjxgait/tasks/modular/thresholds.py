@@ -1,4 +1,4 @@
-"""Thresholds for the tasks of modular bodies: swim, roam, jump and follow."""
+"""Thresholds for the tasks of modular bodies: swim, roam, jump, follow and compete."""
 
 import dataclasses
 from typing import Annotated

@@ -11,7 +11,7 @@ from typing_extensions import override
 from mjxgait.config.tables import STRICT, Positive
 from mjxgait.tasks.base import EpisodeStats
 from mjxgait.tasks.plain import PlainTask
-from mjxgait.tasks.terms import crossed, positive_work
+from mjxgait.tasks.terms import overlap_cost, positive_work
 from mjxgait.types import Sensed, pytree
 
 
@@ -92,7 +92,7 @@ class Turn(PlainTask):
             "turned": jnp.clip(rate / settings.rate, -1.0, 1.0),
             "away": stats.away / (frame.hip_height * seconds),
             "work": stats.work / weight_lifted,
-            "overlap": crossed(self.creature, stats.overlap),
+            "overlap": overlap_cost(self.creature, stats.overlap),
         }
 
     @override

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from mjxgait.creature.body import Body
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.terms import cost_of_transport, crossed, ramped
+from mjxgait.tasks.terms import cost_of_transport, overlap_cost, ramped
 from mjxgait.tasks.walk.config import LIKENESS, TargetConfig, WalkConfig, Weights
 from mjxgait.tasks.walk.gaits import GRAVITY, animal_duty, animal_stride, most_strides, stride_limit
 from mjxgait.tasks.walk.stats import WalkStats
@@ -109,7 +109,7 @@ def plain_terms(
         "energy": cost_of_transport(creature, stats.work, moved),
         "saturation": stats.saturation / lived,
         "limits": stats.limits / lived,
-        "overlap": crossed(creature, stats.overlap),
+        "overlap": overlap_cost(creature, stats.overlap),
         "fall": jnp.where(stats.reason == Reason.FINISHED, 0.0, 1.0),
         "foot_speed": jnp.maximum(_in_hip_speeds(creature, stats.foot_speed) - WHIPPING, 0.0),
     }
@@ -179,8 +179,8 @@ def target_terms(
     length = creature.frame.body_length
     wanted = wanted_speed(creature, config) * seconds / length
     values, _ = plain_terms(creature, config, step, horizon, stats)
-    values |= missed(creature, wish, step, horizon, stats)
-    values["frequency"] = hasty(creature, config, step, stats)
+    values |= target_errors(creature, wish, step, horizon, stats)
+    values["frequency"] = frequency_excess(creature, config, step, stats)
     # Errors count per distance, not per episode: a slow walk covers less.
     longer = WORTH / wanted
     aside = jnp.abs(stats.left) / length
@@ -194,7 +194,7 @@ def target_terms(
         name: value * (walked if name in STYLE or name not in TERMS else 1.0)
         for name, value in values.items()
     }
-    return _shared(styled, config)
+    return _bounded_penalties(styled, config)
 
 
 def wanted_speed(creature: Body, config: WalkConfig) -> jax.Array | float:
@@ -206,7 +206,9 @@ def wanted_speed(creature: Body, config: WalkConfig) -> jax.Array | float:
     return jnp.where(lengths > 0, lengths, usual) * creature.frame.body_length
 
 
-def hasty(creature: Body, config: WalkConfig, step: float, stats: TargetStats) -> jax.Array:
+def frequency_excess(
+    creature: Body, config: WalkConfig, step: float, stats: TargetStats
+) -> jax.Array:
     """Relative excess [] of the stride frequency over its limit.
 
     The limit is that of a walk without targets. A target speed also sets one: the frequency at half
@@ -219,7 +221,7 @@ def hasty(creature: Body, config: WalkConfig, step: float, stats: TargetStats) -
     return jnp.maximum(rate / most - config.frequency, 0.0)
 
 
-def missed(
+def target_errors(
     creature: Body, wish: TargetConfig, step: float, horizon: int, stats: TargetStats
 ) -> dict[str, jax.Array]:
     """Error [] of each target that is set; turns already count in the distance.
@@ -290,7 +292,7 @@ def _half_at(near: float, off: jax.Array) -> jax.Array:
     return away / (away + near)
 
 
-def _shared(values: dict[str, jax.Array], config: WalkConfig) -> dict[str, jax.Array]:
+def _bounded_penalties(values: dict[str, jax.Array], config: WalkConfig) -> dict[str, jax.Array]:
     """Scale the penalties down so that they cost no more than was earned."""
     weights = {name: getattr(config.weights, name) for name in TERMS} | target_weights(config.wish)
     costs = [weights[name] * value for name, value in values.items() if name not in REWARDS]

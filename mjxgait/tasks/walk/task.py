@@ -141,8 +141,7 @@ class TargetedWalk(Walk):
         return (*super().terms, *target_weights(self.wish))
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """The usual initial conditions, and the rate [R] of the commanded turn in
-        rad/s.
+        """The usual initial conditions, and the rate [R] of the commanded turn in rad/s.
 
         With `turn`, all have the target rate. With `steer`, the first goes straight; the others
         turn left and right alternately, at half the target rate at least.

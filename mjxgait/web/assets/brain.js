@@ -1,6 +1,6 @@
 // The networks of creatures that evolve their bodies, written from docs/reference/modular-bodies.md.
 //
-// For the page of `mjxgait share --physics`. It knows neither pages nor MuJoCo. Letters: J hinges,
+// For the page of `mjxgait share --physics`. It uses neither the page nor MuJoCo. Letters: J hinges,
 // N neurons. A wire comes from a column: nothing, the constant 1, the hinges' angles, contact and
 // light of all parts, the neurons' values.
 

@@ -1,6 +1,6 @@
 // The controller of one expression per joint, written from docs/reference/expressions.md.
 //
-// For the page of `mjxgait share --physics`. It knows neither pages nor MuJoCo. Letters: J joints.
+// For the page of `mjxgait share --physics`. It uses neither the page nor MuJoCo. Letters: J joints.
 
 const NAMES = {
   t: "time",

@@ -1,6 +1,6 @@
 // Rough ground, written from docs/reference/ground.md, and a height field of it about the creature.
 //
-// For the page of `mjxgait share --physics`. It knows neither pages nor creatures. Places x, y are in
+// For the page of `mjxgait share --physics`. It uses neither the page nor creatures. Places x, y are in
 // the world; a and b lead ahead and to the left of the start; all in m.
 
 const NEAR = 1e-4; // m; half the distance over which the slope is measured.

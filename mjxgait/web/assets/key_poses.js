@@ -1,7 +1,7 @@
 // The key-pose controller of one creature, written from docs/reference/controller.md.
 //
-// A third implementation beside JAX and NumPy, for the page of `mjxgait share --physics`. It knows
-// neither pages nor MuJoCo. Letters: K key poses, C poses of the cycle, J joints, F feet. Angles are
+// A third implementation beside JAX and NumPy, for the page of `mjxgait share --physics`. It uses
+// neither the page nor MuJoCo. Letters: K key poses, C poses of the cycle, J joints, F feet. Angles are
 // in rad.
 
 import { clip } from "./vectors.js";

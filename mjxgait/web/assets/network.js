@@ -1,6 +1,6 @@
 // The neural network of one creature, written from docs/reference/network.md.
 //
-// For the page of `mjxgait share --physics`. It knows neither pages nor MuJoCo. Letters: I inputs,
+// For the page of `mjxgait share --physics`. It uses neither the page nor MuJoCo. Letters: I inputs,
 // J joints.
 
 const LEVEL = ["trunk_height", "up_vel", "pitch", "pitch_rate"];

@@ -1,6 +1,6 @@
 // One creature in MuJoCo's WebAssembly build, under a controller, with what a visitor may change.
 //
-// It knows neither pages nor kinds of controllers. Falls are written from
+// It uses neither the page nor kinds of controllers. Falls are written from
 // docs/reference/certificate.md. Units: m, kg, s, N, rad; the world's z axis points up.
 
 import { Hand } from "./hand.js";
@@ -101,7 +101,7 @@ export class Simulation {
   // Make the floor rough, at most `size` hip heights above and below level; 0 is the plane again. A
   // creature that the new floor would bury is lifted.
   setRough(size) {
-    const { ground, mujoco, facts, data } = this,
+    const { ground, facts, data } = this,
       lowest = () => Math.min(...facts.solid.map(part => this.height(part))),
       before = Math.min(lowest(), 0);
     ground.size = size;

@@ -14,7 +14,7 @@ from rendering.made_up import treading
 
 import mjxgait
 from mjxgait.animation.keys import Brought, bring, refine
-from mjxgait.animation.keys.cycle import Own
+from mjxgait.animation.keys.cycle import EditedWalk
 from mjxgait.animation.keys.refine import (
     KEYS,
     Original,
@@ -80,7 +80,7 @@ def test_the_first_individual_is_the_drawn_cycle(stool, brought):
 
 def test_a_walk_with_known_genes_starts_close_to_them(stool, brought):
     """It has walked already; a cycle that was never simulated needs a wider search."""
-    own = Own(brought.fit, brought.cycle, 0.0, "error", dict.fromkeys(TUNING, 0.0))
+    own = EditedWalk(brought.fit, brought.cycle, 0.0, "error", dict.fromkeys(TUNING, 0.0))
     usual, close = (
         refining(stool, small_config(), each, 0.5).evolution.initial_spread
         for each in (brought, dataclasses.replace(brought, own=own))

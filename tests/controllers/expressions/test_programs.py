@@ -17,8 +17,8 @@ from deap import gp
 from mjxgait.controllers.expressions.config import FUNCTIONS, ProgramConfig
 from mjxgait.controllers.expressions.controller import evaluator, listed
 from mjxgait.controllers.expressions.operators import (
+    PrimitiveSet,
     Trees,
-    Words,
     crossed,
     depths,
     half_and_half,
@@ -48,16 +48,18 @@ MANY = 10_000
 NODES = 64
 KNOWN = tuple(Terminal(f"a{i}", 64 + i, "joint_pos", i) for i in range(5))
 SETTINGS = ProgramConfig(functions=tuple(FUNCTIONS), nodes=NODES, depth=12)
-WORDS = Words(
+PRIMITIVES = PrimitiveSet(
     tuple(FUNCTION_CODES[name] for name in SETTINGS.functions),
     tuple(terminal.code for terminal in KNOWN),
     NODES,
 )
-evaluate = evaluator(WORDS.functions)
+evaluate = evaluator(PRIMITIVES.functions)
 
 
-def first_programs(count: int, words: Words = WORDS, seed: int = 0) -> tuple[jax.Array, jax.Array]:
-    make = partial(half_and_half, words=words, depth=(2, 5), constants=(-1.0, 1.0))
+def first_programs(
+    count: int, primitives: PrimitiveSet = PRIMITIVES, seed: int = 0
+) -> tuple[jax.Array, jax.Array]:
+    make = partial(half_and_half, primitives=primitives, depth=(2, 5), constants=(-1.0, 1.0))
     return jax.jit(jax.vmap(lambda key: make(key)))(jax.random.split(key_of(seed), count))
 
 
@@ -68,7 +70,7 @@ def programs(as_shipped: None) -> tuple[np.ndarray, np.ndarray]:
     keys = jax.random.split(key_of(1), (2, MANY))
     other = jax.tree.map(lambda leaf: leaf[::-1], tree)
     cross = jax.jit(jax.vmap(lambda k, a, b: crossed(k, a, b, SETTINGS)))
-    mutate = jax.jit(jax.vmap(lambda k, a: mutated(k, a, WORDS, SETTINGS)))
+    mutate = jax.jit(jax.vmap(lambda k, a: mutated(k, a, PRIMITIVES, SETTINGS)))
     code, value = mutate(keys[1], cross(keys[0], tree, other))
     return np.asarray(code), np.asarray(value)
 
@@ -79,7 +81,7 @@ KINDS = ("subtree", "point", "hoist", "constant", "nudge")
 @jax.jit
 def _mutants(keys: jax.Array, code: jax.Array, value: jax.Array, shares: jax.Array) -> Any:
     settings = SimpleNamespace(**vars(SETTINGS) | dict(zip(KINDS, shares, strict=True)))
-    return jax.vmap(lambda key: mutated(key, (code, value), WORDS, settings))(keys)
+    return jax.vmap(lambda key: mutated(key, (code, value), PRIMITIVES, settings))(keys)
 
 
 def mutants(tree: Any, shares: jax.Array, count: int = 1000) -> tuple[np.ndarray, np.ndarray]:
@@ -245,7 +247,7 @@ def test_ten_thousand_programs_match_a_plain_parser_and_deap(programs: Any):
     code, value = programs
     seen = np.random.default_rng(0).normal(size=(MANY, len(KNOWN))).astype(np.float32)
     trees = Trees(jnp.asarray(code)[:, None], jnp.asarray(value)[:, None])
-    listing = jax.jit(jax.vmap(lambda one: listed(one, WORDS)))(trees)
+    listing = jax.jit(jax.vmap(lambda one: listed(one, PRIMITIVES)))(trees)
     ours = np.asarray(jax.jit(jax.vmap(evaluate))(listing, seen))[:, 0]
     known, plain, theirs = deaps(), np.empty(MANY), np.empty(MANY)
     for i in range(MANY):
@@ -263,7 +265,7 @@ def test_a_programs_value_does_not_depend_on_its_batch(programs: Any):
     """One program alone, as in the reference simulator, and in a batch with other lengths."""
     code, value = (jnp.asarray(rows[:16]) for rows in programs)
     seen = jnp.asarray(np.random.default_rng(1).normal(size=(16, len(KNOWN))), jnp.float32)
-    plan = jax.jit(lambda *rows: listed(Trees(*rows), WORDS))
+    plan = jax.jit(lambda *rows: listed(Trees(*rows), PRIMITIVES))
     plans = [plan(code[i : i + 1], value[i : i + 1]) for i in range(16)]
     together = jax.vmap(evaluate)(jax.tree.map(lambda *x: jnp.stack(x), *plans), seen)
     alone = list(map(jax.jit(evaluate), plans, seen))
@@ -278,8 +280,8 @@ def test_initial_programs_have_the_shape_of_deaps(as_shipped: None):
     known = deaps()
     known.addEphemeralConstant("ball", partial(np.random.default_rng(0).uniform, -1, 1))
     theirs = [gp.PrimitiveTree(gp.genHalfAndHalf(known, 2, 5)) for _ in range(MANY)]
-    words = Words(WORDS.functions, WORDS.senses, 512)
-    code = np.asarray(first_programs(MANY, words)[0])
+    primitives = PrimitiveSet(PRIMITIVES.functions, PRIMITIVES.senses, 512)
+    code = np.asarray(first_programs(MANY, primitives)[0])
     ours = {"size": (code != EMPTY).sum(1), "depth": np.array([plain_depth(row) for row in code])}
     expected = {
         "size": np.array([len(tree) for tree in theirs]),
@@ -340,7 +342,7 @@ def test_each_node_costs_the_parsimony_setting():
     texts = [["a0", "(+ a0 0.5)"], ["(+ a0 (* a1 a2))", "0.5"]]
     arrays = [[to_arrays(text, KNOWN, NODES, "x") for text in joints] for joints in texts]
     code, value = (jnp.array([[pair[i] for pair in joints] for joints in arrays]) for i in (0, 1))
-    dear = program_variation(WORDS, 2, ProgramConfig(nodes=NODES, parsimony=0.25))
+    dear = program_variation(PRIMITIVES, 2, ProgramConfig(nodes=NODES, parsimony=0.25))
     assert dear.price is not None
     assert np.asarray(dear.price(Trees(code, value))).tolist() == [1.0, 1.5]
 

@@ -229,7 +229,7 @@ def test_a_run_holds_its_programs_and_resumes_without_the_file(
     ("content", "more", "words"),
     [
         (FOUR.encode() * 9, (), "9 programs, and a population of 8; take --population 9"),
-        (FOUR.encode("utf-16"), (), "is not text in UTF-8"),
+        (FOUR.encode("utf-16"), (), "not a text file in UTF-8"),
         (b"", (), "holds no program"),
         (None, (), "no such file"),
         (b"(list 1 2 3 (+ 1 nose))", (), 'mine.txt, line 1: "nose" is neither'),

@@ -24,7 +24,7 @@ from mjxgait.controllers.key_poses.controller import Genome, PoseTracker, steppi
 from mjxgait.controllers.key_poses.reference import PoseReference
 from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.plugins import resolve_config
@@ -46,7 +46,7 @@ def biped(tmp_path_factory: pytest.TempPathFactory) -> Creature:
     """A biped; left and right hips roll, then pitch; knees and ankles follow."""
     file = tmp_path_factory.mktemp("biped") / "biped.urdf"
     file.write_text(BIPED, encoding="utf-8")
-    return load_files(import_model(file, ImportChoices(apart=False)).files)
+    return creature_of(import_model(file, ImportChoices(apart=False)).files)
 
 
 def seen(creature: Creature, lifted: int | None = None, **changed: np.ndarray) -> Sensed:
@@ -133,7 +133,7 @@ def test_quadrupeds_and_in_line_feet_do_not_step(tmp_path: Path):
         file = tmp_path / f"body.{kind}"
         file.write_text(text, encoding="utf-8")
         choices = ImportChoices(apart=False, forward="x")
-        creature = load_files(import_model(file, choices).files)
+        creature = creature_of(import_model(file, choices).files)
         assert not creature.corrections.steps
         usual, own = Config(), resolve_config(creature.settings.train, creature.name)
         dear = {"foot_speed": own.fitness.weights.foot_speed, "fall": 1.0, "airborne": 9.0}
@@ -207,7 +207,7 @@ def turner(tmp_path_factory: pytest.TempPathFactory) -> Creature:
         )
     file = tmp_path_factory.mktemp("turner") / "turner.urdf"
     file.write_text(text, encoding="utf-8")
-    return load_files(import_model(file, ImportChoices(apart=False)).files)
+    return creature_of(import_model(file, ImportChoices(apart=False)).files)
 
 
 def test_a_heading_error_turns_the_body_on_the_stance_leg(turner: Creature):

@@ -14,7 +14,7 @@ from mjxgait.controllers.sims_brain.genotype import (
     Ranges,
     random_graph,
 )
-from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.phenotype import GrownBody, body_of
 from mjxgait.evolution.chance import key_of
 from mjxgait.physics.batched_trees.tree import ModularSensed
 from mjxgait.types import Sensed
@@ -30,7 +30,7 @@ def random_graphs(seed: int) -> Graph:
 
 
 @partial(jax.jit, static_argnums=1)
-def bodies_of(graphs: Graph, capacity: Capacity = CAPACITY) -> Body:
+def bodies_of(graphs: Graph, capacity: Capacity = CAPACITY) -> GrownBody:
     """Bodies of graphs [LANES]."""
     return jax.vmap(lambda graph: body_of(graph, capacity))(graphs)
 

@@ -10,14 +10,21 @@ import numpy as np
 import pytest
 from controllers.sims_brain.made_up import one
 
-from mjxgait.controllers.sims_brain.brain import Brain, Perceived, blank, fired, thought, wired
+from mjxgait.controllers.sims_brain.brain import (
+    Brain,
+    Perceived,
+    blank,
+    brain_step,
+    neuron_step,
+    wired,
+)
 from mjxgait.controllers.sims_brain.genotype import (
     Capacity,
     NerveRoom,
     Ranges,
 )
-from mjxgait.controllers.sims_brain.operators import Genotype, Kin
-from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.operators import Genotype, GraphOperators
+from mjxgait.controllers.sims_brain.phenotype import GrownBody, body_of
 from mjxgait.controllers.sims_brain.reference import BrainReference, fire
 from mjxgait.controllers.sims_brain.reference_body import NEURONS, grow
 from mjxgait.evolution.chance import key_of
@@ -26,16 +33,18 @@ from mjxgait.rendering.curves import figure
 from mjxgait.training.experiment import arrays_of
 
 CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(steer=True, skills=3), 200, 0.01
-KIN = Kin(CAPACITY, ROOM, Ranges())
-FIRED = jax.jit(fired, static_argnums=3)
-CREATE = jax.jit(jax.vmap(KIN.create))
-THINK = jax.jit(jax.vmap(lambda brain, mind, seen, skill: thought(brain, mind, seen, STEP, skill)))
+OPERATORS = GraphOperators(CAPACITY, ROOM, Ranges())
+NEURON_STEP = jax.jit(neuron_step, static_argnums=3)
+CREATE = jax.jit(jax.vmap(OPERATORS.create))
+BRAIN_STEP = jax.jit(
+    jax.vmap(lambda brain, mind, seen, skill: brain_step(brain, mind, seen, STEP, skill))
+)
 NEURONS_IN_ALL = CAPACITY.parts * ROOM.local + ROOM.central
 
 
 @jax.jit
 @jax.vmap
-def born(genotype: Genotype) -> tuple[Body, Brain]:
+def born(genotype: Genotype) -> tuple[GrownBody, Brain]:
     """Bodies and brains of genotypes [COUNT]; all tests share these programs."""
     body = body_of(genotype.graph, CAPACITY)
     return body, wired(genotype.nerves, genotype.centre, body, ROOM)
@@ -52,7 +61,7 @@ def test_a_neuron_computes_the_function_of_its_name(name: str):
     inputs, memory = rng.normal(0, 3, (300, 3)).astype(np.float32), rng.uniform(0, 1, 300)
     inputs[:20, 1] = 0.0
     kinds = jnp.full(300, NEURONS.index(name))
-    output, kept = FIRED(kinds, jnp.asarray(inputs), jnp.float32(memory), 0.005)
+    output, kept = NEURON_STEP(kinds, jnp.asarray(inputs), jnp.float32(memory), 0.005)
     plain, remembered = fire(name, np.float64(inputs).T, memory, 0.005)
     np.testing.assert_allclose(output, plain, atol=2e-4)
     np.testing.assert_allclose(kept, remembered, atol=2e-4)
@@ -62,7 +71,7 @@ def test_any_input_gives_a_finite_value():
     values = np.array([0.0, 1e-30, -1e-4, 3.0, -10.0, 1e8, -1e30], np.float32)
     inputs = np.stack(np.meshgrid(values, values, values), -1).reshape(-1, 3)
     for kind in range(len(NEURONS)):
-        output, kept = FIRED(
+        output, kept = NEURON_STEP(
             jnp.full(len(inputs), kind), jnp.asarray(inputs), jnp.ones(len(inputs)), 0.005
         )
         assert np.isfinite(output).all(), NEURONS[kind]
@@ -85,7 +94,7 @@ def test_a_brain_matches_its_reference_controller():
         angles = np.float32(rng.uniform(-1, 1, (COUNT, CAPACITY.links)))
         contact = np.float32(rng.integers(0, 2, (COUNT, CAPACITY.links)))
         light = np.float32(rng.normal(size=(COUNT, CAPACITY.links, 3)))
-        torque, minds = THINK(brains, minds, Perceived(angles, contact, light), skills)
+        torque, minds = BRAIN_STEP(brains, minds, Perceived(angles, contact, light), skills)
         for i in np.flatnonzero([len(found) > 0 for found in links]):
             last = one(bodies, i).parts.last[: len(references[i].parts)]
             senses = {
@@ -140,7 +149,7 @@ def brain_of(genotype: Genotype, skill: int = 0) -> BrainReference:
     return BrainReference(genome, parts, hinges, STEP, skill=skill)
 
 
-def reference(genotype: Genotype, body: Body, skill: int) -> tuple[list[int], BrainReference]:
+def reference(genotype: Genotype, body: GrownBody, skill: int) -> tuple[list[int], BrainReference]:
     """The links of all hinges, part by part, and the brain that drives them."""
     plain = brain_of(genotype, skill)
     links = [
@@ -211,7 +220,7 @@ def test_mirrored_limbs_have_mirrored_torques():
     seen = Perceived(np.float32(bent), np.zeros(CAPACITY.links, np.float32), np.float32(ahead))
     perceived, minds = repeated(seen), repeated(blank(NEURONS_IN_ALL))
     for _ in range(3):
-        torques, minds = THINK(brains, minds, perceived, np.zeros(COUNT, int))
+        torques, minds = BRAIN_STEP(brains, minds, perceived, np.zeros(COUNT, int))
     left, right = (np.flatnonzero(moving(body) & (copies == image)) for image in (0, 1))
     torque = np.asarray(torques) * sign
     np.testing.assert_allclose(torque[:, left], torque[:, right], rtol=1e-5)

@@ -7,7 +7,7 @@ from controllers.sims_brain.made_up import CAPACITY, genome_of, one, random_grap
 
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.controllers.sims_brain.reference_files import body_files
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.errors import UserError
 from mjxgait.reference.overlap import overlaps
 
@@ -29,7 +29,7 @@ def test_grown_bodies_are_creatures(grown_parts: list):
             with pytest.raises(UserError, match="has no hinge"):
                 body_files(parts, "grown", 0.005, 9.81, 0.9, "on land")
             continue
-        creature = load_files(body_files(parts, "grown", 0.005, 9.81, 0.9, "on land"))
+        creature = creature_of(body_files(parts, "grown", 0.005, 9.81, 0.9, "on land"))
         tried += 1
         assert len(creature.joints.names) == len(hinges)
         assert len(creature.feet.names) == len(parts)
@@ -50,14 +50,14 @@ def test_grown_bodies_are_creatures(grown_parts: list):
 @pytest.mark.parametrize("step", [0.005, 0.01])
 def test_contacts_are_as_stiff_as_the_time_step_allows(grown_parts: list, step: float):
     parts = next(p for p in grown_parts if sum(len(part.hinges) for part in p) > 3)
-    model = load_files(body_files(parts, "grown", step, 9.81, 0.9, "on land")).model
+    model = creature_of(body_files(parts, "grown", step, 9.81, 0.9, "on land")).model
     assert model.opt.timestep == step
     assert np.allclose(model.geom_solref, [2 * step, 1.0])
 
 
 def test_a_swimmer_has_no_contact_with_the_floor(grown_parts: list):
     parts = next(p for p in grown_parts if sum(len(part.hinges) for part in p) > 3)
-    creature = load_files(body_files(parts, "swimmer", 0.005, 0.0, None, "in water"))
+    creature = creature_of(body_files(parts, "swimmer", 0.005, 0.0, None, "in water"))
     data = mujoco.MjData(creature.model)
     mujoco.mj_resetDataKeyframe(creature.model, data, 0)
     data.qpos[2] = 0.0
@@ -70,7 +70,7 @@ def test_blocks_of_a_grown_body_collide(grown_parts: list):
     """MuJoCo keeps all blocks without a common joint apart, in any pose."""
     rng, met = np.random.default_rng(0), 0
     for parts in (p for p in grown_parts if sum(len(part.hinges) for part in p) > 3):
-        creature = load_files(body_files(parts, "grown", 0.01, 9.81, 0.9, "on land"))
+        creature = creature_of(body_files(parts, "grown", 0.01, 9.81, 0.9, "on land"))
         data = mujoco.MjData(creature.model)
         data.qpos[:] = creature.stand_qpos
         data.qpos[2] = 10.0

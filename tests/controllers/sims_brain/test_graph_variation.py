@@ -17,7 +17,7 @@ from mjxgait.controllers.sims_brain.genotype import STEER, Capacity, NerveRoom, 
 from mjxgait.controllers.sims_brain.growth import grown
 from mjxgait.controllers.sims_brain.operators import (
     Genotype,
-    Kin,
+    GraphOperators,
     Rates,
     reachable,
 )
@@ -27,7 +27,7 @@ from mjxgait.evolution.state import Origin
 from mjxgait.inspect.family import CROSSED, GRAFTED, Relative, connected, mixed
 
 CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(steer=True, skills=3), Ranges(), 2000
-KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))
+OPERATORS = GraphOperators(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))
 BUSY = ("mutate", "cross", "graft")
 ALIVE = jax.jit(jax.vmap(reachable))
 GROWN = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))
@@ -35,7 +35,7 @@ GROWN = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))
 
 @pytest.fixture(scope="module")
 def parents() -> tuple[Genotype, Genotype]:
-    create = jax.jit(jax.vmap(KIN.create))
+    create = jax.jit(jax.vmap(OPERATORS.create))
     first, second = (create(jax.random.split(key_of(seed), COUNT)) for seed in (0, 1))
     return jax.device_get((first, second))
 
@@ -43,16 +43,16 @@ def parents() -> tuple[Genotype, Genotype]:
 @cache
 def breeder(name: str) -> Callable[..., Genotype]:
     """An operator, compiled once for all its children."""
-    return jax.jit(jax.vmap(getattr(KIN, name)))
+    return jax.jit(jax.vmap(getattr(OPERATORS, name)))
 
 
 @jax.jit
 def _mutated(rates: tuple[Any, ...], keys: jax.Array, mothers: Genotype) -> Genotype:
     """Rates are traced, as in a run, so that all share a program."""
-    return jax.vmap(Kin(CAPACITY, ROOM, RANGES, Rates(*rates)).mutate)(keys, mothers)
+    return jax.vmap(GraphOperators(CAPACITY, ROOM, RANGES, Rates(*rates)).mutate)(keys, mothers)
 
 
-def mutants(mothers: Genotype, seed: int, rates: Rates = KIN.rates) -> Genotype:
+def mutants(mothers: Genotype, seed: int, rates: Rates = OPERATORS.rates) -> Genotype:
     values = [getattr(rates, field.name) for field in dataclasses.fields(rates)]
     keys = jax.random.split(key_of(seed), COUNT)
     return jax.device_get(_mutated(tuple(values), keys, mothers))
@@ -221,9 +221,11 @@ def test_central_neurons_do_not_change_a_graphs_mutation():
     """Central neurons do not grow, so they do not count among the values of which a few change."""
     graphs = []
     for central in (CAPACITY.nodes, CAPACITY.nodes + 1):
-        kin = Kin(CAPACITY, NerveRoom(central=central), RANGES)
+        operators = GraphOperators(CAPACITY, NerveRoom(central=central), RANGES)
         keys = jax.random.split(key_of(4), 100)
-        child = jax.jit(jax.vmap(lambda key, kin=kin: kin.mutate(key, kin.create(key))))(keys)
+        child = jax.jit(
+            jax.vmap(lambda key, operators=operators: operators.mutate(key, operators.create(key)))
+        )(keys)
         graphs.append(child.graph)
     for a, b in zip(*map(jax.tree.leaves, graphs), strict=True):
         np.testing.assert_array_equal(a, b)

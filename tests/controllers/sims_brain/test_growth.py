@@ -21,7 +21,7 @@ from mjxgait.controllers.sims_brain.genotype import (
 )
 from mjxgait.controllers.sims_brain.growth import Parts, grown
 from mjxgait.controllers.sims_brain.operators import Genotype
-from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.phenotype import GrownBody, body_of
 from mjxgait.controllers.sims_brain.reference_body import JOINTS, ROOM, grow
 from mjxgait.controllers.sims_brain.reference_files import body_xml
 from mjxgait.evolution.chance import key_of
@@ -204,11 +204,11 @@ def test_rigid_joints_start_unbent():
         np.testing.assert_allclose(qpos, [0.3] * (7 + hinges) + [0] * (11 - hinges), atol=1e-7)
 
 
-def moving(body: Body) -> np.ndarray:
+def moving(body: GrownBody) -> np.ndarray:
     return np.asarray(body.tree.moves) > 0
 
 
-def joints_in_the_world(body: Body) -> tuple[np.ndarray, np.ndarray]:
+def joints_in_the_world(body: GrownBody) -> tuple[np.ndarray, np.ndarray]:
     """Places and axes [n, 3] of all links, with all angles at 0."""
     tree = jax.tree.map(np.asarray, body.tree)
     places, frames = [np.zeros(3)], [np.eye(3)]

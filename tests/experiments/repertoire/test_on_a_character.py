@@ -13,7 +13,7 @@ from importer.rigs import glb
 from rendering.made_up import treading
 
 from mjxgait.animation.export import WalkLoop, read_character, standing_still, stride_in_phase
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.experiments.repertoire.clips import CLIPS, IDLE, TABLE, Transition, write_clips
 from mjxgait.experiments.repertoire.found import Found
 from mjxgait.experiments.repertoire.grid import Cell
@@ -32,7 +32,7 @@ def written(folder: Path, size: float) -> tuple[dict, gltf.GLTF2, WalkLoop]:
     file = folder / "dog.glb"
     file.write_bytes(styled(glb(soles=True), transform(size=size), ()))
     files = import_model(file, ImportChoices(apart=False, height=HEIGHT)).files
-    creature = load_files(files)
+    creature = creature_of(files)
     loop = stride_in_phase(record_walk(creature, treading(creature, degrees=5.0), 4.0), 30)
     found = [
         Found(CELL, True, 0.2, 0.0, 0.6, "trot", 0.3, ()),

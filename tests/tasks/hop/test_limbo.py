@@ -23,8 +23,8 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.plugins.registry import build_config
-from mjxgait.reference.layout import FAR, Clearance
-from mjxgait.reference.layout import RADIUS as EXAMINED_RADIUS
+from mjxgait.reference.bar import FAR, Clearance
+from mjxgait.reference.bar import RADIUS as EXAMINED_RADIUS
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.starts import nominal_starts, perturbed_starts
@@ -37,8 +37,8 @@ from mjxgait.training.experiment import build_experiment
 from mjxgait.training.generation import (
     LEADERS,
     RunParams,
-    climbed,
     next_starts,
+    with_level_raised,
 )
 from mjxgait.types import Sensed
 
@@ -250,17 +250,17 @@ def test_the_bar_comes_down_when_most_of_the_best_pass(
     state = at(dataclasses.replace(state, fitness=fitness), level=4, generation=7)
     state = at(state, quiet=6, barren=2, spell_best=3.0)
     settings = LimboConfig(lowering=5)
-    after = climbed(task, settings, state)
+    after = with_level_raised(task, settings, state)
     assert int(after.level) == 4 + has_curriculum
     assert bool(after.stale) == has_curriculum
     assert (np.asarray(after.rounds) == (0.0 if has_curriculum else 3.0)).all()
     spells = (int(after.quiet), int(after.barren), float(after.spell_best))
     assert spells == ((-1, 0, -np.inf) if has_curriculum else (6, 2, 3.0))
     nobody = (at(state, generation=-1), at(state, fitness=np.full(len(terms), -np.inf)))
-    assert all(int(climbed(task, settings, unjudged).level) == 4 for unjudged in nobody)
-    assert climbed(task, settings, dataclasses.replace(state, level=None)).level is None
+    assert all(int(with_level_raised(task, settings, unjudged).level) == 4 for unjudged in nobody)
+    assert with_level_raised(task, settings, dataclasses.replace(state, level=None)).level is None
     # At the lowest bar the level stays, and results are kept.
-    down = climbed(task, LimboConfig(lowering=4), state)
+    down = with_level_raised(task, LimboConfig(lowering=4), state)
     assert int(down.level) == 4
     assert not bool(down.stale)
     assert (np.asarray(down.rounds) == 3.0).all()

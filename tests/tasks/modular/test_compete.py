@@ -21,7 +21,7 @@ from mjxgait.champion import Champion
 from mjxgait.config.schema import Config
 from mjxgait.controllers.sims_brain.operators import Genotype
 from mjxgait.controllers.sims_brain.reference_body import CUBE, DISTANCE, grow, opponent_genome
-from mjxgait.creature.scale import load_files
+from mjxgait.creature.load import creature_of
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.plugins.fit import check_fit
@@ -286,7 +286,7 @@ def test_other_moving_bodies_are_refused_unless_they_are_named(
         files["creature.toml"].replace(', "cube"', "").replace('    "cube",\n', "")
     )
     with pytest.raises(UserError, match='body "cube" moves but is no part'):
-        load_files(files)
+        creature_of(files)
 
 
 def test_walkers_begin_a_run_with_the_first_opponent(experiment: Experiment, first: Any):

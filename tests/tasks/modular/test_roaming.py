@@ -27,7 +27,7 @@ from mjxgait.reference.bodies import VELOCITY_STAGE
 from mjxgait.reference.grown import seen_grown
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import nominal_starts
-from mjxgait.reference.stepping import Stepping
+from mjxgait.reference.stepping import ReferenceSimulation
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.modular.base import ModularTask
 from mjxgait.tasks.modular.config import JumpConfig, RoamConfig
@@ -137,7 +137,9 @@ def test_reference_light_direction_is_in_each_blocks_own_axes(experiment: Experi
         moved_light=np.stack([0 * light, 0 * light, light]),
         light_time=np.array([1.1, np.inf, 0.9]),
     )
-    bodies = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task).bodies
+    bodies = ReferenceSimulation(
+        body, champion, start, 0, task.fall(CertificateConfig()), task
+    ).bodies
     bodies.qpos[:, 3:7] = [0.5, -0.5, 0.1, 0.7]
     bodies.batch.forward(stage=VELOCITY_STAGE)
     seen, dark, moved = bodies.light(np.arange(3), np.ones(3))
@@ -159,7 +161,7 @@ def test_only_starts_with_the_same_light_and_bar_are_shared(experiment: Experime
     body, task = champion.embodied(experiment.creature), acceptance_of("follow-on-land")
     lights = np.array([[10.0, 0, 0], [0, 10.0, 0], [10.0, 0, 0]])
     start = dataclasses.replace(nominal_starts(body, 3), light=lights)
-    stepping = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task)
+    stepping = ReferenceSimulation(body, champion, start, 0, task.fall(CertificateConfig()), task)
     leader, waiting = stepping._alike(None)
     assert {leader, *waiting} == {0, 2}
     stepping.starts = dataclasses.replace(

@@ -35,7 +35,7 @@ from mjxgait.experiments.ablation.measures import walked
 from mjxgait.kinds import skills_of, tasks
 from mjxgait.plugins.fit import check_fit
 from mjxgait.plugins.registry import build_config
-from mjxgait.simulation.evaluator import Local
+from mjxgait.simulation.evaluator import LocalEvaluator
 from mjxgait.simulation.rollout import Episodes
 from mjxgait.tasks.modular.jump import LYING
 from mjxgait.tasks.modular.skills import AllTrades, Amphibian, Skills, SkillsStats
@@ -80,7 +80,7 @@ class Simulated:
 
     def __init__(self, experiment: Experiment) -> None:
         self._simulate = jax.jit(experiment.simulator.simulate)
-        self._verdict = jax.jit(jax.vmap(Local(experiment.simulator).verdict))
+        self._verdict = jax.jit(jax.vmap(LocalEvaluator(experiment.simulator).evaluation_of))
 
     def simulate(self, *rows: Any) -> Episodes:
         """Genomes, trials and settings, each of one row; as NumPy arrays, for the same program."""

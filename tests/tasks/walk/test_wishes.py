@@ -21,7 +21,8 @@ from mjxgait.config.layers import data_folder, shipped_creatures
 from mjxgait.config.schema import Config, UseConfig
 from mjxgait.config.traced import traced
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.scale import SETTINGS, facing, load_files
+from mjxgait.creature.load import SETTINGS, creature_of
+from mjxgait.creature.scale import facing
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.plugins import resolve_config
@@ -414,7 +415,7 @@ def usually(creature: Creature, file: Path | None = None, **asked) -> Config:
 def natural_dog() -> Creature:
     """A dog with the natural gait as its default."""
     files = load_creature(data_folder("envs") / "tall_quadruped").files
-    return load_files({**files, SETTINGS: files[SETTINGS] + '[usual]\ngait = "natural"\n'})
+    return creature_of({**files, SETTINGS: files[SETTINGS] + '[usual]\ngait = "natural"\n'})
 
 
 def test_a_creature_can_set_a_default_gait():
@@ -452,7 +453,7 @@ def test_any_target_or_settings_file_replaces_the_default_gait(tmp_path: Path):
 
 
 def test_an_unknown_default_gait_is_reported_with_its_file(stool: Creature):
-    odd = load_files(
+    odd = creature_of(
         {**stool.files, SETTINGS: stool.files[SETTINGS] + '[usual]\ngait = "waddle"\n'}
     )
     with pytest.raises(UserError, match=r"stool/creature\.toml: \[usual\]: .*waddle"):

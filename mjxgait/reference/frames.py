@@ -9,20 +9,21 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import beside
-from mjxgait.reference.layout import Clearance, LowestPoint, per_foot
+from mjxgait.reference.bar import Clearance
+from mjxgait.reference.layout import LowestPoint, per_foot
 from mjxgait.reference.stepping import examined_model
 from mjxgait.reference.terrain import terrain_of
 
 
-class Sight:
+class FrameReader:
     """Reader of frames from an MjData; a frame not read is NaN (`touch`: true)."""
 
     def __init__(self, creature: Creature, frames: int, bar: np.ndarray | None) -> None:
         self.creature, self.model = creature, examined_model(creature)
         self.data = mujoco.MjData(self.model)
-        feet = len(creature.feet.names)
+        count = len(creature.feet.names)
         foot_geoms = creature.feet.watched[: len(creature.feet.foot_of)]
-        self.reach = LowestPoint(self.model, foot_geoms, terrain_of(creature))
+        self.feet = LowestPoint(self.model, foot_geoms, terrain_of(creature))
         self.foot_of_geom = np.full(self.model.ngeom, -1)
         self.foot_of_geom[foot_geoms] = creature.feet.foot_of
         self.may_touch = np.isin(np.arange(self.model.ngeom), [*foot_geoms, *creature.feet.ground])
@@ -32,7 +33,7 @@ class Sight:
             np.full((frames, 3, 3), np.nan),
         )
         self.foot_force, self.foot_slip, self.foot_height = (
-            np.full((frames, feet), np.nan) for _ in range(3)
+            np.full((frames, count), np.nan) for _ in range(3)
         )
         self.bar, self.over = bar, None if bar is None else Clearance(creature)
         self.clearance = np.full(frames, np.nan)
@@ -42,16 +43,16 @@ class Sight:
             np.empty((frames, model.ngeom, 3)),
             np.empty((frames, model.ngeom, 9)),
         )
-        self.spun = np.empty((frames, model.nbody, 6))
-        self.inertial, self.middle = (np.empty((frames, model.nbody, 3)) for _ in range(2))
-        self.met: list[tuple[np.ndarray, ...]] = []
+        self.cvel = np.empty((frames, model.nbody, 6))
+        self.xipos, self.subtree_com = (np.empty((frames, model.nbody, 3)) for _ in range(2))
+        self.contacts: list[tuple[np.ndarray, ...]] = []
         self.touch, self.penetration, self.body_speed = (
             np.ones(frames, bool),
             np.full(frames, np.nan),
             np.full(frames, np.nan),
         )
 
-    def look(self, k: int, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> None:
+    def read(self, k: int, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> None:
         """Read one frame; frames come in order of time."""
         data, creature = self.data, self.creature
         data.qpos[:], data.qvel[:] = qpos, qvel
@@ -62,8 +63,8 @@ class Sight:
             data.xmat[creature.trunk].reshape(3, 3),
         )
         self.geom_xpos[k], self.geom_xmat[k] = data.geom_xpos, data.geom_xmat
-        self.spun[k] = data.cvel
-        self.inertial[k], self.middle[k] = data.xipos, data.subtree_com
+        self.cvel[k] = data.cvel
+        self.xipos[k], self.subtree_com[k] = data.xipos, data.subtree_com
         self._contacts(k)
         self.seen = k + 1
 
@@ -71,11 +72,11 @@ class Sight:
         """Compute what follows from the poses and contacts of all frames read."""
         seen = slice(self.seen)
         poses = self.geom_xpos[seen], self.geom_xmat[seen]
-        self.foot_height[seen] = per_foot(self.creature, self.reach.heights(*poses))
-        arm = self.inertial[seen] - self.middle[seen][:, self.model.body_rootid]
+        self.foot_height[seen] = per_foot(self.creature, self.feet.heights(*poses))
+        arm = self.xipos[seen] - self.subtree_com[seen][:, self.model.body_rootid]
         own = ~beside(self.model, self.creature.settings.creature.beside)
         own[0] = False
-        speed = np.linalg.norm(_moving(self.spun[seen], arm)[:, own], axis=2)
+        speed = np.linalg.norm(_moving(self.cvel[seen], arm)[:, own], axis=2)
         self.body_speed[seen] = speed.max(1)
         self._loads()
         if self.bar is not None and self.over is not None:
@@ -93,20 +94,24 @@ class Sight:
             mujoco.mj_contactForce(self.model, data, on_floor[place], force)
             pressed[place] = force[0]
         at, axes = contact.pos[on_floor], contact.frame[on_floor]
-        self.met.append((np.full(len(geom), k), geom, contact.dist[on_floor], at, axes, pressed))
+        self.contacts.append(
+            (np.full(len(geom), k), geom, contact.dist[on_floor], at, axes, pressed)
+        )
 
     def _loads(self) -> None:
         """Compute force, slip, touch and penetration from all contacts with the floor."""
         seen = slice(self.seen)
         self.foot_force[seen] = self.foot_slip[seen] = self.touch[seen] = self.penetration[seen] = 0
-        if not self.met:
+        if not self.contacts:
             return
-        frame, geom, apart, at, axes, pressed = map(np.concatenate, zip(*self.met, strict=True))
+        frame, geom, apart, at, axes, pressed = map(
+            np.concatenate, zip(*self.contacts, strict=True)
+        )
         np.maximum.at(self.penetration, frame, -apart)
         self.touch[frame[~self.may_touch[geom]]] = True
         body = self.model.geom_bodyid[geom]
-        arm = at - self.middle[frame, self.model.body_rootid[body]]
-        velocity = _moving(self.spun[frame, body], arm)
+        arm = at - self.subtree_com[frame, self.model.body_rootid[body]]
+        velocity = _moving(self.cvel[frame, body], arm)
         first, second = np.moveaxis(axes.reshape(-1, 3, 3)[:, 1:], 1, 0)
         slip = np.hypot((velocity * first).sum(1), (velocity * second).sum(1))
         foot = self.foot_of_geom[geom]
@@ -118,12 +123,12 @@ class Sight:
         self.foot_slip[carrying] /= self.foot_force[carrying]
 
 
-def _moving(spun: np.ndarray, arm: np.ndarray) -> np.ndarray:
+def _moving(cvel: np.ndarray, arm: np.ndarray) -> np.ndarray:
     """Return world velocities [..., 3] of material points at arms [..., 3] m.
 
     Arms begin at the tree's centre of mass, the reference point of `cvel` [..., 6].
     """
-    spin, slide = spun[..., :3], spun[..., 3:]
+    spin, slide = cvel[..., :3], cvel[..., 3:]
     # np.cross takes five times as long for so few points.
     turn = spin[..., [1, 2, 0]] * arm[..., [2, 0, 1]] - spin[..., [2, 0, 1]] * arm[..., [1, 2, 0]]
     return slide + turn
