@@ -54,8 +54,16 @@ def make_env(
     from mjxgait.api.environments import problem_of
     from mjxgait.environments.gym import CreatureEnv, compiled
 
-    given = (creature, task, config, settings, observe, perturbed)
-    return CreatureEnv(_COMPILED.find(repr(given), lambda: compiled(problem_of(*given))))
+    problem = problem_of(creature, task, config, settings, observe, perturbed)
+    # Of what it was made, not by what it was named: files may have been edited since.
+    key = (
+        problem.creature.digest,
+        repr(problem.config),
+        type(problem.task),
+        problem.observe,
+        perturbed,
+    )
+    return CreatureEnv(_COMPILED.find(key, lambda: compiled(problem)))
 
 
 def register() -> None:

@@ -6,10 +6,18 @@ Progress goes to the logger "mjxgait" at level INFO, details of the machine at D
 
 import io
 import logging
+from collections.abc import Callable
 
 from rich.console import Console
 
 LOG = logging.getLogger("mjxgait")
+
+Tell = Callable[[str], object]
+"""Receives lines of a report."""
+
+
+def silent(said: str) -> None:
+    """Drop a line of a report."""
 
 
 class Output:

@@ -1,6 +1,6 @@
 """A creature folder from a model file."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -11,6 +11,7 @@ from mjxgait.errors import UserError
 from mjxgait.files import path_of, writing
 from mjxgait.importer import TOML, WRITTEN, ImportChoices, Imported
 from mjxgait.importer import import_model as read_model
+from mjxgait.output import Tell, silent
 from mjxgait.training.folder import write_creature
 
 
@@ -26,7 +27,7 @@ def import_model(
     forward: Literal["x", "-x", "y", "-y"] | None = None,
     height: float | None = None,
     force: bool = False,
-    tell: Callable[[str], object] = lambda said: None,
+    tell: Tell = silent,
 ) -> Creature:
     """Make a creature folder from a model (MJCF, URDF, xacro, BVH, GLB, FBX); return the creature.
 

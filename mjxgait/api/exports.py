@@ -1,7 +1,7 @@
 """The champion's walk as a file for other programs: animation, numbers, one page."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +9,7 @@ from mjxgait.animation import Rate
 from mjxgait.api.run import Place, Run
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, require_ending
+from mjxgait.output import Tell, silent
 from mjxgait.training.folder import require_output
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ NUMBERS = (".csv", ".json")
 PAGES = (".html", ".htm")
 ONTO, CAPSULES = (".glb", ".fbx"), "none"
 """Ends of a file with a character; and what is given instead of one."""
-Tell = Callable[[str], object]
 
 
 def export(
@@ -31,7 +31,7 @@ def export(
     onto: Place | None = None,
     rate: Rate = 30,
     travelling: bool = False,
-    tell: Tell = lambda said: None,
+    tell: Tell = silent,
 ) -> Path:
     """Write the walk as a loop (GLB, FBX, BVH, USD) or as numbers (CSV, JSON); return the file.
 
@@ -88,7 +88,7 @@ def share(
     *,
     physics: bool = False,
     wasm: Place | None = None,
-    tell: Tell = lambda said: None,
+    tell: Tell = silent,
 ) -> Path:
     """Write one offline page with the champion in 3D, or a repertoire to steer; return the file.
 

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from mjxgait.api.exports import Tell, folder_of, sized
+from mjxgait.api.exports import folder_of, sized
 from mjxgait.api.run import Place, Run, runs_of
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, replaced, writing
+from mjxgait.output import Tell, silent
 
 if TYPE_CHECKING:
     from mjxgait.rendering.stage import Stage
@@ -58,7 +59,7 @@ def render(
     slow: float = 1.0,
     renderer: Renderer = "auto",
     background: Background = "scene",
-    tell: Tell = lambda said: None,
+    tell: Tell = silent,
 ) -> Path:
     """Make a video or a filmstrip of a champion, or a race of several; return the file.
 

@@ -4,12 +4,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mjxgait.api.exports import PAGES, Tell, folder_of, sized
+from mjxgait.api.exports import PAGES, folder_of, sized
 from mjxgait.api.run import Place, Run, runs_of
 from mjxgait.api.studies import STUDY, champions_of_study
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, require_ending
 from mjxgait.kinds import title_of
+from mjxgait.output import Tell, silent
 from mjxgait.training.folder import CHAMPION, CONFIG, require_output
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def gallery(
     poster: Place | None = None,
     video: Place | None = None,
     title: str = "",
-    tell: Tell = lambda said: None,
+    tell: Tell = silent,
 ) -> Path:
     """Write an offline page on which champions move side by side, by what they do; return it.
 

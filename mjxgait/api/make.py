@@ -18,6 +18,7 @@ from mjxgait.creature.load import creature_of
 from mjxgait.creature.scale import at_step, facing, scaled
 from mjxgait.errors import UserError
 from mjxgait.files import path_of
+from mjxgait.output import Tell, silent
 from mjxgait.training.folder import check_run, create_run
 from mjxgait.training.logs import Line
 
@@ -31,7 +32,7 @@ OnGeneration = Callable[[Line], object]
 def load_creature(
     env: Place,
     scale: Mapping[str, float] | None = None,
-    tell: Callable[[str], object] = lambda said: None,
+    tell: Tell = silent,
     way: str = "forward",
 ) -> Creature:
     """Load a shipped creature by name, a creature folder, a model file or `robot:NAME`.
@@ -221,7 +222,7 @@ def refine(
         creature, path_of(config) if config else None, seed, population, generations, settings
     )
     table = read_toml(path_of(names)) if isinstance(names, str | Path) else names
-    tell: Callable[[str], object] = (lambda said: None) if quiet else print
+    tell: Tell = silent if quiet else print
     brought = bring(creature, source, table, (begin, end), np.radians(tolerance), forward, tell)
     chosen = near.refining(creature, base, brought, keep)
     folder = check_run(path_of(out) if out else None, creature, chosen)

@@ -98,5 +98,5 @@ class _Screen(Progress):
         best = bests(done.lines[-1]) if done.lines else ""
         self.output.say(
             f"generation {generation} of {last}, best fitness of each: {best}; "
-            f"{pace(done, last - generation)}"
+            f"{pace(done.steps, done.seconds, len(done.lines), last - generation)}"
         )

@@ -1,11 +1,6 @@
 """Progress of runs side by side, as plain lines."""
 
-from typing import TYPE_CHECKING
-
 from mjxgait.output import Output, duration
-
-if TYPE_CHECKING:
-    from mjxgait.distributed.jobs import Advanced
 
 
 class Progress:
@@ -19,8 +14,10 @@ class Progress:
         self.output.say(f"examined in C MuJoCo: {count} of {of}")
 
 
-def pace(done: "Advanced", generations: int) -> str:
-    """Return the speed, and the time that the generations ahead may take, in words."""
-    left = generations * done.seconds / max(len(done.lines), 1)
-    speed = done.steps / max(done.seconds, 1e-9) / 1e6
-    return f"{speed:.2f} M steps/s, {duration(left)} left"
+def pace(steps: int, seconds: float, done: int, left: int) -> str:
+    """Return the speed, and the time that the generations ahead may take, in words.
+
+    steps: simulated in these seconds and `done` generations. left: generations ahead.
+    """
+    rest = left * seconds / max(done, 1)
+    return f"{steps / max(seconds, 1e-9) / 1e6:.2f} M steps/s, {duration(rest)} left"

@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from mjxgait.config.tables import build, merge, not_none
 from mjxgait.creature import Creature
 from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
 from mjxgait.files import path_of, replaced, write_text
-from mjxgait.output import Output
+from mjxgait.output import Output, Tell, silent
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import WalkTargets, speed_of, with_targets
 from mjxgait.training.disk import disk_errors
@@ -203,9 +203,7 @@ class Planned:
     configs: Mapping[Cell, Config]
 
 
-def planned(
-    options: RepertoireRequest, tell: Callable[[str], object] = lambda said: None
-) -> Planned:
+def planned(options: RepertoireRequest, tell: Tell = silent) -> Planned:
     """Check the options and return the plan. Writes nothing.
 
     tell: called with the notes of the import of a model file.
@@ -342,7 +340,7 @@ class _Screen(Progress):
         self.output.say(
             f"{name}: generation {generation} of {last}, {len(alive)} walks side by side, "
             f"{sum(alive) / len(alive):.0%} of their episodes without a fall, "
-            f"{pace(done, last - generation)}"
+            f"{pace(done.steps, done.seconds, len(done.lines), last - generation)}"
         )
 
     def changed(self, count: int, of: int) -> None:

@@ -1,6 +1,5 @@
 """A robot to build from a champion with a grown body, as on the command line."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from mjxgait.api.exports import folder_of
@@ -8,6 +7,7 @@ from mjxgait.api.run import Place, Run
 from mjxgait.errors import UserError
 from mjxgait.files import path_of, writing
 from mjxgait.kinds import title_of
+from mjxgait.output import Tell, silent
 from mjxgait.training.folder import is_taken
 
 SECONDS = 20.0
@@ -16,7 +16,6 @@ TASKS = ("roam", "jump")
 """Tasks on land without a light: a robot has no eyes for it."""
 LENGTHS, WALLS = (5.0, 100.0), (1.2, 10.0)
 """cm and mm; thinner walls do not print well, and are not stiff."""
-Tell = Callable[[str], object]
 
 
 def build(
@@ -26,7 +25,7 @@ def build(
     length: float = 20.0,
     wall: float = 2.0,
     servos: Place | None = None,
-    tell: Tell = lambda said: None,
+    tell: Tell = silent,
 ) -> Path:
     """Write the parts, the bill of materials and the model of a robot; return the folder.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from mjxgait.api.progress import Progress
+from mjxgait.api.progress import Progress, pace
 from mjxgait.api.requests import check_resumed
 from mjxgait.api.run import Place
 from mjxgait.champion import Champion, read_champion
@@ -295,11 +295,10 @@ class _Progress(Progress):
             return
         if news["note"] and not news["generation"]:
             self.output.say(news["note"])
-        left = (news["of"] - news["generation"]) * news["seconds"] / max(news["generations"], 1)
-        speed = news["steps"] / max(news["seconds"], 1e-9) / 1e6
+        left = news["of"] - news["generation"]
         self.output.say(
-            f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, "
-            f"{duration(left)} left"
+            f"{where}: generation {news['generation']} of {news['of']}, "
+            f"{pace(news['steps'], news['seconds'], news['generations'], left)}"
         )
 
 

@@ -11,6 +11,7 @@ from mjxgait.cli.options import Verbosity, parsed
 from mjxgait.errors import UserError
 from mjxgait.experiments.multi_seed import folders_of, is_multi_seed
 from mjxgait.kinds import tasks, title_of
+from mjxgait.output import silent
 from mjxgait.training.folder import open_run
 
 PAGE = "gallery.html"
@@ -79,7 +80,7 @@ def gallery_command(arguments: Sequence[str]) -> int:
         check_files(options.out, options.poster, options.video)
         if code := _evolve(options, folders[0]):
             return code
-    tell = (lambda said: None) if options.quiet else print
+    tell = silent if options.quiet else print
     pictures = {"poster": options.poster, "video": options.video}
     gallery(folders, out, **pictures, title=options.title, tell=tell)
     return 0

@@ -17,6 +17,7 @@ from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import read_toml
 from mjxgait.creature import Creature
 from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.output import silent
 from mjxgait.training.folder import check_parts, check_run, command, new_run_folder, open_run
 
 
@@ -91,7 +92,7 @@ def refine_command(arguments: Sequence[str]) -> int:
         (options.begin, options.end),
         np.radians(options.tolerance),
         options.forward,
-        (lambda said: None) if quiet else print,
+        silent if quiet else print,
     )
     configs = [refining(creature, base, brought, keep) for keep in options.keep]
     if options.only_show:

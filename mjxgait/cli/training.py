@@ -3,7 +3,7 @@
 import argparse
 import contextlib
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,7 +26,7 @@ from mjxgait.experiments.multi_seed import (
     folders_of,
     is_multi_seed,
 )
-from mjxgait.output import Output
+from mjxgait.output import Output, Tell, silent
 from mjxgait.plugins.registry import meant
 from mjxgait.tasks.walk.targets import (
     TARGETS,
@@ -57,29 +57,20 @@ def train(arguments: Sequence[str]) -> int:
     shape = options_of(type(default))
     options = parsed(shape, "train", arguments, shape(settings=default))
     config = _settings(options)
+    several = options.runs is not None or _is_multi_seed(options.resume)
+    _check_options(options, several)
     if not options.resume:
         creature = at_step(creature, config.rollout.step)
         if options.expressions:
             config = with_expressions(creature, config, options.expressions)
-    elif options.expressions:
-        raise UserError(
-            f"{options.resume}: a resumed run keeps the programs that it began with; --expressions "
-            "needs a new run"
-        )
-    if options.source and (options.resume or options.runs is not None):
-        raise UserError("--from: for a single new run, without --resume and --runs")
     if not options.quiet:
         for line in (*notes, *filter(None, [hint(config)])):
             print(line)
-    if options.tries != 1 and (options.resume or options.runs is not None):
-        raise UserError("--tries: for new runs one after another, without --resume and --runs")
     mine = options.resume is None and options.env not in shipped_creatures()
     if mine and config.use.task == "walk" and not options.quiet:
         _tell_limits(creature)
-    if options.runs is not None or _is_multi_seed(options.resume):
+    if several:
         return _several(options, creature, config, default)
-    if options.generation is not None and options.resume is None:
-        raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
     if options.resume is None:
         return _until_certified(options, creature, config)
     if whole := shows_skill_of(options.resume):
@@ -97,6 +88,23 @@ def train(arguments: Sequence[str]) -> int:
         print(over)
         return 0
     return _evolve(options, options.resume, creature, config)
+
+
+def _check_options(options: TrainOptions, several: bool) -> None:
+    """Refuse options that do not go together. several: whether several runs go side by side."""
+    if options.resume and options.expressions:
+        raise UserError(
+            f"{options.resume}: a resumed run keeps the programs that it began with; --expressions "
+            "needs a new run"
+        )
+    if options.source and (options.resume or options.runs is not None):
+        raise UserError("--from: for a single new run, without --resume and --runs")
+    if options.tries != 1 and (options.resume or options.runs is not None):
+        raise UserError("--tries: for new runs one after another, without --resume and --runs")
+    if several and (options.view or options.log or options.generation is not None):
+        raise UserError("--runs: several runs have no --view, no --log and no --generation")
+    if options.generation is not None and options.resume is None:
+        raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
 
 
 def _check_resumed(options: TrainOptions, config: Config, default: Config) -> None:
@@ -163,8 +171,6 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
 
 def _several(options: TrainOptions, creature: Creature, config: Config, default: Config) -> int:
     """Evolve several runs side by side; return the exit code."""
-    if options.view or options.log or options.generation is not None:
-        raise UserError("--runs: several runs have no --view, no --log and no --generation")
     output = Output(quiet=options.quiet)
     if options.resume is None:
         assert options.runs is not None
@@ -219,9 +225,7 @@ def _plot_fitness(folder: Path, subject: str = "") -> None:
             plot_fitness(lines, folder / PLOT, subject)
 
 
-def _layers(
-    arguments: Sequence[str], tell: Callable[[str], object] = lambda said: None
-) -> tuple[Creature, Config]:
+def _layers(arguments: Sequence[str], tell: Tell = silent) -> tuple[Creature, Config]:
     """Return the creature and the settings below the options; they are the options' defaults.
 
     tell: called with the notes of the import of a model file.

@@ -15,6 +15,7 @@ from typing_extensions import override
 
 from mjxgait.distributed.jobs import Job, Programs, Recipe
 from mjxgait.errors import UserError
+from mjxgait.output import Tell, silent
 
 Result = TypeVar("Result")
 
@@ -103,7 +104,7 @@ class Scheduler:
     def __init__(
         self,
         backend: Backend,
-        tell: Callable[[str], object] = lambda said: None,
+        tell: Tell = silent,
         watch: Callable[["Scheduler"], object] = lambda scheduler: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:

@@ -19,9 +19,8 @@ from mjxgait.config.traced import traced
 from mjxgait.controllers.observations import check_observations, sense
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.plugins import make_task
 from mjxgait.plugins.fit import check_fit
-from mjxgait.plugins.registry import what_ends
+from mjxgait.plugins.registry import task_of
 from mjxgait.simulation.episode import deepened, is_going, reason_of
 from mjxgait.simulation.rollout import CHECK_EVERY
 from mjxgait.tasks.base import EpisodeStats, Task, in_order
@@ -272,8 +271,7 @@ def make_problem(
         )
     check_fit(creature, config)
     body = creature.spanned(config.evolution.pose_span).on(config.rollout.ground)
-    ends = what_ends(body, config.rollout)
-    task = make_task(body, float(body.model.opt.timestep), ends, config)
+    task = task_of(body, config)
     names = observe or (*OBSERVED, *task.adds)
     check_observations(names, task.adds)
     return Problem(body, config, task, names, perturbed)

@@ -27,9 +27,8 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.state import Origin
 from mjxgait.inspect.sections import island_facts, view_of
 from mjxgait.inspect.snapshot import Snapshot
-from mjxgait.plugins import make_task, resolve_config
-from mjxgait.plugins.registry import what_ends
-from mjxgait.tasks.base import Task
+from mjxgait.plugins import resolve_config
+from mjxgait.plugins.registry import task_of
 from mjxgait.training.folder import CERTIFICATE, STRESS, kept_champion
 from mjxgait.training.lock import running
 from mjxgait.training.logs import Line
@@ -241,16 +240,9 @@ def forced_spells(lines: Sequence[Line]) -> list[Spell]:
     return spells
 
 
-def task_of(snapshot: Snapshot) -> Task:
-    """Return the run's task."""
-    creature, config = snapshot.creature, snapshot.config
-    step, ends = float(creature.model.opt.timestep), what_ends(creature, config.rollout)
-    return make_task(creature, step, ends, config)
-
-
 def terms_of(snapshot: Snapshot) -> tuple[str, ...]:
     """Return the names of the fitness terms; none if the task now has another number of them."""
-    names = task_of(snapshot).terms
+    names = task_of(snapshot.creature, snapshot.config).terms
     return names if snapshot.arrays["terms"].shape[-1] == len(names) else ()
 
 
@@ -261,7 +253,7 @@ def contributions(snapshot: Snapshot) -> np.ndarray:
     terms = np.asarray(snapshot.arrays["terms"], float)
     if not terms_of(snapshot):
         return terms[:, 0, :0]
-    task = task_of(snapshot)
+    task = task_of(snapshot.creature, snapshot.config)
     counted = task.weights(snapshot.config.fitness, jnp.int32(snapshot.generation))
     weights = np.array([float(counted[name]) for name in task.terms])
     worst = snapshot.config.rollout.worst

@@ -64,6 +64,12 @@ def make_task(body: "Body", step: float, ends: "Termination | Ends", config: Con
     return made
 
 
+def task_of(creature: Creature, config: Config) -> "Task":
+    """Return the task of a run of this creature."""
+    step, ends = float(creature.model.opt.timestep), what_ends(creature, config.rollout)
+    return make_task(creature, step, ends, config)
+
+
 def what_ends(creature: Creature, config: RolloutConfig) -> Termination:
     """Return the termination conditions: the creature's, overridden by the config's."""
     if not config.terminate:

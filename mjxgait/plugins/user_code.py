@@ -190,6 +190,7 @@ RENAMED = {
     "harder": "at_level",
     "judge": "evaluate",
     "mastered": "level_passed",
+    "numbers": "genome_statistics",
     "onward": "next_goal",
     "senses": "observations",
     "standards": "params",

@@ -12,8 +12,7 @@ from mjxgait.controllers.sims_brain.reference import BrainReference
 from mjxgait.controllers.sims_brain.reference_body import IN_LIGHT
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.plugins import make_task
-from mjxgait.plugins.registry import what_ends
+from mjxgait.plugins.registry import task_of
 from mjxgait.reference.controllers import reference_of
 from mjxgait.rendering import brain, filmstrip, genomes
 from mjxgait.rendering.brain import network_of
@@ -115,7 +114,6 @@ def _of_grown(run: Path, walk: Walk) -> Figures:
 
 def _weights(creature: Creature, config: Config, lines: Lines) -> dict[str, np.ndarray]:
     """Signed weight [generations] of each term of the run's task."""
-    step, ends = float(creature.model.opt.timestep), what_ends(creature, config.rollout)
-    task = make_task(creature, step, ends, config)
+    task = task_of(creature, config)
     rows = [task.weights(config.fitness, jnp.int32(line["generation"])) for line in lines]
     return {name: np.array([float(row[name]) for row in rows]) for name in task.terms}

@@ -170,8 +170,8 @@ def open_server(watcher: Watcher, port: int | None = None) -> ThreadingHTTPServe
         follows = watcher
 
     if port is not None:
-        if not 1 <= port <= 65535:
-            raise UserError(f"--port {port}: give a number from 1 to 65535")
+        if not 0 <= port <= 65535:
+            raise UserError(f"--port {port}: give a number from 0, for any free one, to 65535")
         try:
             return _Server((HERE, port), Handler)
         except OSError as error:

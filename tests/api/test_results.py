@@ -90,18 +90,18 @@ def test_python_and_the_command_line_ask_for_the_same_study(
 ):
     asked: list[studies.AblateRequest] = []
 
-    def finished(planned: object, request: studies.AblateRequest, output: Output) -> Path:
+    def evolve_study(planned: object, request: studies.AblateRequest, output: Output) -> Path:
         asked.append(request)
         return tmp_path / "report.md"
 
     for place in (studies, ablate):
-        monkeypatch.setattr(place, "finished", finished)
+        monkeypatch.setattr(place, "evolve_study", evolve_study)
     found = mjxgait.ablate("null", out="x", env=str(STOOL), seeds=2, generations=1, quiet=True)
     assert found == tmp_path / "report.md"
     with pytest.raises(SystemExit):
         main(f"ablate null --out x --env {STOOL} --seeds 2 --generations 1".split())
     assert asked[0] == asked[1]
-    monkeypatch.setattr(studies, "finished", lambda *_: None)
+    monkeypatch.setattr(studies, "evolve_study", lambda *_: None)
     with pytest.raises(KeyboardInterrupt):
         mjxgait.ablate("null", env=str(STOOL), seeds=2, generations=1, quiet=True)
 

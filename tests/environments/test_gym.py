@@ -3,8 +3,10 @@
 `test_functional` compares them with the functional environment.
 """
 
+import shutil
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -79,6 +81,18 @@ def test_bodies_that_blow_up_end_the_episode(stool_env, monkeypatch):
     assert (terminated, info["reason"]) == (True, -1)
     assert np.isfinite(observation).all()
     assert np.isfinite(reward)
+
+
+def test_an_edited_body_is_another_environment(tmp_path: Path, monkeypatch):
+    """In one process, under the name of the same folder."""
+    monkeypatch.setattr("mjxgait.environments.gym.compiled", lambda problem: problem)
+    monkeypatch.setattr("mjxgait.environments.gym.CreatureEnv", lambda problem: problem)
+    shutil.copytree(STOOL, tmp_path / "stool")
+    model = tmp_path / "stool" / "creature.xml"
+    first, again = (make_env(str(tmp_path / "stool")) for _ in range(2))
+    assert again is first
+    model.write_text(model.read_text().replace("<mujoco", "<!-- edited -->\n<mujoco", 1))
+    assert make_env(str(tmp_path / "stool")) is not first
 
 
 def test_ground_that_is_not_flat_is_refused():

@@ -259,7 +259,7 @@ def test_the_dead_are_not_judged_on(experiment: Experiment):
     @jax.jit
     def after(reason: jax.Array, steps: jax.Array) -> object:
         lane.stats = dataclasses.replace(stats, reason=reason, steps=steps)
-        return simulator._evaluate(lane, sensed, torque)
+        return simulator._updated_stats(lane, sensed, torque)
 
     alive = after(jnp.int32(Reason.FINISHED), jnp.int32(7))
     assert alive.steps == 8

@@ -22,6 +22,7 @@ from mjxgait.animation.keys.cycle import (
 from mjxgait.animation.keys.retarget import Retargeted, axes_of, matched, movers, retarget
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.output import Tell, silent
 
 READERS: Mapping[str, Callable[[Path], Clip | AngleTrack]] = {
     ".glb": read_glb,
@@ -58,7 +59,7 @@ def bring(
     ends: tuple[float | None, float | None] = (None, None),
     tolerance: float = np.radians(3.0),
     way: str | None = None,
-    tell: Callable[[str], object] = lambda said: None,
+    tell: Tell = silent,
 ) -> Brought:
     """Read a file and fit key poses to its cycle.
 

@@ -148,7 +148,7 @@ def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
         ({"measure": "generations"}, ["threshold"]),
         ({"measure": "certified"}, ["certify = true"]),
         ({"seeds": 1}, ["seeds"]),
-        ({"grid": {"evolution.sigma": [0.1]}, "variant": TWO}, ["either"]),
+        ({"grid": {"evolution.sigma": [0.1]}, "variant": TWO}, ["one of the two"]),
         ({"qustion": "?"}, ["qustion", "question"]),
     ],
 )

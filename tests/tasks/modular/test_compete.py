@@ -1,6 +1,7 @@
 """Bodies that compete for a cube: all meet the best of the generation before."""
 
 import dataclasses
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -282,10 +283,13 @@ def test_other_moving_bodies_are_refused_unless_they_are_named(
     contests: list[tuple[Any, Champion]],
 ):
     files = dict(contests[0][1].embodied(load_creature("blocks")).files)
-    files["creature.toml"] = (
-        files["creature.toml"].replace(', "cube"', "").replace('    "cube",\n', "")
-    )
-    with pytest.raises(UserError, match='body "cube" moves but is no part'):
+    whole = files["creature.toml"]
+    files["creature.toml"] = re.sub(r"beside = \[[^]]*\]", "beside = []", whole)
+    assert files["creature.toml"] != whole
+    with pytest.raises(UserError, match="moves but is no part"):
+        creature_of(files)
+    files["creature.toml"] = whole.replace(', "cube"', "").replace('    "cube",\n', "")
+    with pytest.raises(UserError, match="beside: must name the opponent and the cube"):
         creature_of(files)
 
 
