@@ -4,6 +4,7 @@ import dataclasses
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pygltflib as gltf
@@ -11,8 +12,11 @@ import pytest
 from animation.keys.made import PERIOD, RATE, bvh, columns, poses, swings, write
 from helpers import STOOL
 from rendering.made_up import treading
+from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.clips.clip import NOTE
+from mjxgait.animation.clips.read_glb import _turn
+from mjxgait.animation.clips.read_text import read_csv
 from mjxgait.animation.export import WalkLoop, build_glb
 from mjxgait.animation.keys import bring
 from mjxgait.animation.keys.bring import Brought
@@ -245,3 +249,31 @@ def test_a_walk_of_another_creature_is_read_as_a_plain_cycle(stool, exported, tm
         document.nodes[0].extras = {NOTE: json.dumps(changed)}
         (tmp_path / "walk.glb").write_bytes(b"".join(document.save_to_bytes()))
         assert bring(stool, tmp_path / "walk.glb", tolerance=LOOSE).own is None
+
+
+@pytest.mark.parametrize("ends", [(1.5, 0.5), (5.0, None), (None, 9.0)])
+def test_seconds_that_a_file_does_not_have_are_refused(
+    ends: tuple[float | None, float | None], stool: Creature, tmp_path: Path
+):
+    file = write(tmp_path, "csv", stool, swings(stool))
+    with pytest.raises(UserError, match=r"--from .* the file has 0 to"):
+        bring(stool, file, None, ends)
+
+
+def test_a_quotation_mark_that_never_ends_is_one_sentence(tmp_path: Path):
+    file = tmp_path / "walk.csv"
+    file.write_text('time,"a\n' + "0,0\n" * 60_000)
+    with pytest.raises(UserError, match="field larger than field limit"):
+        read_csv(file)
+
+
+def test_a_mirrored_node_is_turned_as_its_mirror_image():
+    turned = Rotation.from_euler("y", 30, degrees=True)
+    mirrored = turned.as_matrix() * [-1.0, 1.0, 1.0]
+    whole = np.eye(4)
+    whole[:3, :3] = 2 * mirrored
+    for node in (
+        SimpleNamespace(matrix=None, rotation=turned.as_quat().tolist(), scale=[-2, 2, 2]),
+        SimpleNamespace(matrix=whole.T.ravel().tolist()),
+    ):
+        assert _turn(node) == pytest.approx(turned.as_matrix())

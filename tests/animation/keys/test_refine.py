@@ -28,7 +28,7 @@ from mjxgait.animation.keys.refine import (
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.cli import main
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.controllers.key_poses.config import TUNING
+from mjxgait.controllers.key_poses.config import TUNING, gene_names
 from mjxgait.controllers.key_poses.controller import PoseTracker
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -90,6 +90,15 @@ def test_a_walk_with_known_genes_starts_close_to_them(stool, brought):
     still_closer = small_config(evolution={"initial_spread": 0.1})
     known = dataclasses.replace(brought, own=own)
     assert refining(stool, still_closer, known, 0.5).evolution.initial_spread == 0.1
+
+
+def test_a_known_walk_of_a_body_that_steps_keeps_its_steps(stool, brought):
+    genes = dict.fromkeys(gene_names(True), 0.2)
+    own = EditedWalk(brought.fit, brought.cycle, 0.0, "error", genes)
+    config = refining(stool, small_config(), dataclasses.replace(brought, own=own), 0.9).controller
+    assert config.stepping.step == pytest.approx((0.1, 0.3))
+    assert config.stepping.turn == pytest.approx((0.16, 0.24))
+    assert config.tuning.steer[0] <= 0.2 <= config.tuning.steer[1]
 
 
 def test_settings_of_another_creature_are_refused(shipped, stool, brought):
