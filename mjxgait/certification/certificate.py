@@ -172,6 +172,27 @@ def certify(
     config = config or CertificateConfig()
     began = time.perf_counter()
     seen = seen or nominal_check(creature, champion, config)
+    found, report = _disturbed(creature, champion, config, threads)
+    tested = sorted((*seen.criteria, *found), key=lambda c: c.number)
+    report = acceptance_of(champion.task, champion.wish).report(seen.whole, config) | report
+    report |= advised(tested, champion.task, report, creature)
+    return Certificate(
+        creature.name,
+        creature.digest,
+        champion.task,
+        champion.fingerprint,
+        tuple(tested),
+        report,
+        config,
+        time.perf_counter() - began,
+        attempts,
+    )
+
+
+def _disturbed(
+    creature: Creature, champion: Champion, config: CertificateConfig, threads: int
+) -> tuple[tuple[Criterion, ...], dict[str, object]]:
+    """Evaluate the criteria on starts and pushes drawn for the champion; and their report."""
     draw = trials.own_draw(champion, config)
     acceptance = acceptance_of(champion.task, champion.wish)
     disturbed = trials.starts(creature, config, draw, config.starts.count)
@@ -191,24 +212,12 @@ def certify(
     started = float(np.split(acceptance.succeeded(outcome, starts, config), ends)[1].mean())
     found = acceptance.disturbed(started, pushed[0] if pushed else np.nan, config)
     found += steering_criteria(creature, champion, config, draw, threads)
-    tested = sorted((*seen.criteria, *found), key=lambda c: c.number)
-    report = acceptance.report(seen.whole, config) | {"ground": str(creature.terrain)}
+    report: dict[str, object] = {"ground": str(creature.terrain)}
     report |= _fell(np.split(outcome.fell, ends)[1])
     if pushed:
         sizes = (0.0, config.pushes.speed, *config.pushes.ladder)
         report |= _bears(dict(zip(sizes, (plain, *pushed), strict=True)))
-    report |= advised(tested, champion.task, report, creature)
-    return Certificate(
-        creature.name,
-        creature.digest,
-        champion.task,
-        champion.fingerprint,
-        tuple(tested),
-        report,
-        config,
-        time.perf_counter() - began,
-        attempts,
-    )
+    return found, report
 
 
 def record(

@@ -188,18 +188,10 @@ def trial_run(
     """
     config = config or CertificateConfig()
     draw, acceptance = common_draw(config), acceptance_of(champion.task, champion.wish)
-    disturbed = acceptance.aimed(
-        starts(creature, config, draw, count), config, draw.generator(AIMS)
-    )
-    extra: tuple[Starts, ...] = ()
-    seconds = config.seconds
-    if acceptance.by_pushes:
-        extra = (pushes(creature, config, draw, count),)
-        seconds = min(seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
-    begun = acceptance.aimed(join(disturbed, *extra), config)
+    begun, seconds = _trial_starts(creature, champion, count, config)
 
     def margin(well: np.ndarray) -> float:
-        pushed = _cautious(well[count:], caution) if extra else np.nan
+        pushed = _cautious(well[count:], caution) if acceptance.by_pushes else np.nan
         return _worst(acceptance.disturbed(_cautious(well[:count], caution), pushed, config))
 
     watch = Watch(len(begun), lambda lost: margin(~lost) < wanted)
@@ -212,6 +204,21 @@ def trial_run(
     if reached < wanted:
         return reached
     return min(reached, _worst(steering_criteria(creature, champion, config, draw)))
+
+
+def _trial_starts(
+    creature: Creature, champion: Champion, count: int, config: CertificateConfig
+) -> tuple[Starts, float]:
+    """Return the starts of a trial run, those with a push last, and its length in s."""
+    draw, acceptance = common_draw(config), acceptance_of(champion.task, champion.wish)
+    disturbed = acceptance.aimed(
+        starts(creature, config, draw, count), config, draw.generator(AIMS)
+    )
+    if not acceptance.by_pushes:
+        return acceptance.aimed(disturbed, config), config.seconds
+    pushed = pushes(creature, config, draw, count)
+    seconds = min(config.seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
+    return acceptance.aimed(join(disturbed, pushed), config), seconds
 
 
 def _cautious(well: np.ndarray, caution: float) -> float:

@@ -90,22 +90,7 @@ def _check_alone(path: str, text: str) -> None:
 def _assemble(
     settings: CreatureSettings, files: Mapping[str, str], model: mujoco.MjModel
 ) -> Creature:
-    trunk = _id(model, mujoco.mjtObj.mjOBJ_BODY, settings.creature.trunk, "creature.trunk")
-    if not model.body_jntnum[trunk]:
-        raise UserError(
-            f'creature.trunk = "{settings.creature.trunk}": has no joint, so it cannot move; give '
-            "it a free joint, or name the body that has one"
-        )
-    for key, parts in (("rig.bones", settings.rig.bones), ("rig.turned", settings.rig.turned)):
-        for part in parts:
-            _id(model, mujoco.mjtObj.mjOBJ_BODY, part, key)
-    _check_numbers(model)
-    beside = [
-        _id(model, mujoco.mjtObj.mjOBJ_BODY, name, "creature.beside")
-        for name in settings.creature.beside
-    ]
-    floor = _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor")
-    check_world(model, trunk, floor, beside)
+    trunk = _checked_trunk(model, settings)
     data = _standing(model, settings.creature.keyframe)
     axes = _trunk_axes(data.xmat[trunk].reshape(3, 3), np.array(settings.creature.forward))
     found = _actuated(model, trunk, geometry.beside(model, settings.creature.beside))
@@ -124,26 +109,52 @@ def _assemble(
         ),
         gains=Gains(values["kp"], values["kd"], values["torque_limit"]),
         mirror=Mirror(sign, tuple(map(int, partner)), settings.mirror.symmetric),
-        corrections=Corrections(
-            steer_bend=_weights(settings.steering.bend, names, "steering.bend"),
-            steer_stride=_weights(settings.steering.stride, names, "steering.stride"),
-            balance_pitch=_weights(settings.balance.pitch, names, "balance.pitch"),
-            balance_roll=_weights(settings.balance.roll, names, "balance.roll"),
-            stepping=stepping_of(
-                model,
-                _weights(settings.stepping.ahead, names, "stepping.ahead"),
-                _weights(settings.stepping.aside, names, "stepping.aside"),
-                _weights(settings.stepping.turn, names, "stepping.turn"),
-                found,
-                _foot_bodies(model, settings)[0],
-            ),
-        ),
+        corrections=_corrections(model, settings, found, names),
         feet=_feet(model, data, settings, trunk, axes),
     )
     _check(creature, data)
     if settings.creature.planar:
         _check_plane(creature, data)
     return creature
+
+
+def _checked_trunk(model: mujoco.MjModel, settings: CreatureSettings) -> int:
+    """Return the trunk's id, once all other names and the model's numbers are checked."""
+    own, body = settings.creature, mujoco.mjtObj.mjOBJ_BODY
+    trunk = _id(model, body, own.trunk, "creature.trunk")
+    if not model.body_jntnum[trunk]:
+        raise UserError(
+            f'creature.trunk = "{own.trunk}": has no joint, so it cannot move; give it a free '
+            "joint, or name the body that has one"
+        )
+    for key, parts in (("rig.bones", settings.rig.bones), ("rig.turned", settings.rig.turned)):
+        for part in parts:
+            _id(model, body, part, key)
+    _check_numbers(model)
+    beside = [_id(model, body, name, "creature.beside") for name in own.beside]
+    check_world(model, trunk, _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor"), beside)
+    return trunk
+
+
+def _corrections(
+    model: mujoco.MjModel, settings: CreatureSettings, joints: list[int], names: list[str]
+) -> Corrections:
+    """The weights of all corrections. joints: ids of the actuated ones, and their names."""
+    steering, balance, stepping = settings.steering, settings.balance, settings.stepping
+    return Corrections(
+        steer_bend=_weights(steering.bend, names, "steering.bend"),
+        steer_stride=_weights(steering.stride, names, "steering.stride"),
+        balance_pitch=_weights(balance.pitch, names, "balance.pitch"),
+        balance_roll=_weights(balance.roll, names, "balance.roll"),
+        stepping=stepping_of(
+            model,
+            _weights(stepping.ahead, names, "stepping.ahead"),
+            _weights(stepping.aside, names, "stepping.aside"),
+            _weights(stepping.turn, names, "stepping.turn"),
+            joints,
+            _foot_bodies(model, settings)[0],
+        ),
+    )
 
 
 def _actuated(model: mujoco.MjModel, trunk: int, beside: np.ndarray) -> list[int]:

@@ -128,24 +128,21 @@ def standing(
             break
         found = _best_pose(search, poses, functools.partial(attempt, stronger), found)
     what, best = found
-    held = best.held
     notes.changes, notes.guesses = best.notes.changes, best.notes.guesses
-    if held.stands:
-        best.notes.guess(
-            "standing pose",
-            what,
-            "high",
-            f"stood 2 s: sag {held.sag:.3f} rad, upright {held.up:.2f}",
-        )
-    else:
-        touched = f', "{held.touched}" touches the floor' if held.touched else ""
-        best.notes.guess(
-            "standing pose",
-            what,
-            "low",
-            f"it falls: upright {held.up:.2f}, height {held.height:.2f} of the start{touched}",
-        )
+    _guess_pose(what, best)
     return best
+
+
+def _guess_pose(what: str, best: Candidate) -> None:
+    """Note a candidate's standing pose as a guess. what: where the pose is from."""
+    held = best.held
+    if held.stands:
+        reason = f"stood 2 s: sag {held.sag:.3f} rad, upright {held.up:.2f}"
+        best.notes.guess("standing pose", what, "high", reason)
+        return
+    touched = f', "{held.touched}" touches the floor' if held.touched else ""
+    reason = f"it falls: upright {held.up:.2f}, height {held.height:.2f} of the start{touched}"
+    best.notes.guess("standing pose", what, "low", reason)
 
 
 def _best_pose(
