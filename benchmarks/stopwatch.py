@@ -64,6 +64,8 @@ def main() -> None:
     watch.watch(loop, "_generation", "evolution")
     # Validation runs in parallel: it delays evolution only where the loop waits.
     watch.watch(looks.Validation, "found", "waiting for looks")
+    # With pre-screening it runs here.
+    watch.watch(looks.Validation, "begin", "waiting for looks")
     watch.watch(examination.Examiner, "best", "examination at the end")
     watch.watch(checkpoint.Checkpoints, "save", "checkpoints")
     watch.watch(checkpoint.Checkpoints, "close", "checkpoints")
