@@ -2,19 +2,17 @@
 
 import dataclasses
 import hashlib
-import tomllib
 from pathlib import Path
 
 import tomli_w
 
 from mjxgait.animation.clips.clip import read_bytes
 from mjxgait.animation.clips.fbx import FBX
-from mjxgait.config.tables import STRICT, build
+from mjxgait.config.tables import STRICT, build, parse_toml
 from mjxgait.creature import Creature
 from mjxgait.creature.creature import ORIGIN
 from mjxgait.creature.settings import RigSettings
 from mjxgait.errors import UserError
-from mjxgait.files import check_tree
 
 KINDS = (".glb", FBX)
 """Ends of files that a walk can be put onto."""
@@ -96,10 +94,8 @@ def _digest(path: Path) -> str:
 
 def _parsed(text: str, where: str) -> Origin:
     try:
-        table = tomllib.loads(text)
-        check_tree(table)
-        return build(Origin, table, ORIGIN)
-    except (ValueError, RecursionError, UserError) as error:
+        return build(Origin, parse_toml(text, ORIGIN), ORIGIN)
+    except UserError as error:
         raise UserError(
             f"{where}: {ORIGIN} is damaged ({error}); take that file away, or name the character "
             "with --onto"

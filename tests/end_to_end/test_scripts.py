@@ -39,8 +39,7 @@ ELSEWHERE = {
     "speed.py": "tests/benchmarks/test_bench.py",
     "fuzz_readers.py": "needs atheris; tests/animation/keys/test_hostile_keys.py and "
     "tests/importer/test_fuzz.py change files too",
-    "build_addons.py": "tests/addons/test_blender.py runs it in the checkout, "
-    "whose add-ons it packs",
+    "build_addons.py": "tests/addons/test_blender.py runs it in the checkout that has the add-ons",
     "plant_faults.py": "tests/test_faults.py runs it on a tree of its own",
 }
 """Scripts not run here, and why."""

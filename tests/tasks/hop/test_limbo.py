@@ -256,8 +256,10 @@ def test_the_bar_comes_down_when_most_of_the_best_pass(
     assert (np.asarray(after.rounds) == (0.0 if has_curriculum else 3.0)).all()
     spells = (int(after.quiet), int(after.barren), float(after.spell_best))
     assert spells == ((-1, 0, -np.inf) if has_curriculum else (6, 2, 3.0))
-    nobody = (at(state, generation=-1), at(state, fitness=np.full(len(terms), -np.inf)))
-    assert all(int(with_level_raised(task, settings, unjudged).level) == 4 for unjudged in nobody)
+    without_result = (at(state, generation=-1), at(state, fitness=np.full(len(terms), -np.inf)))
+    assert all(
+        int(with_level_raised(task, settings, unjudged).level) == 4 for unjudged in without_result
+    )
     assert with_level_raised(task, settings, dataclasses.replace(state, level=None)).level is None
     # At the lowest bar the level stays, and results are kept.
     down = with_level_raised(task, LimboConfig(lowering=4), state)
