@@ -7,6 +7,7 @@ water. The quadruped treads. Processor time, best of the rounds; no controllers 
 """
 
 import argparse
+import dataclasses
 import time
 from collections.abc import Callable
 
@@ -32,13 +33,15 @@ def blocks(capacity: Capacity, around: Surroundings) -> Run:
     def grow(key: jax.Array):
         return body_of(random_graph(key, capacity, Ranges()), capacity)
 
+    plant = TreePlant(around)
     bodies = jax.jit(jax.vmap(grow))(jax.random.split(key_of(0), LANES))
-    tree = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), bodies.tree)
+    trees = jax.vmap(plant.prepared)(bodies.tree)
+    tree = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), trees)
     still = jnp.zeros((capacity.links + 5, LANES))
     qpos = jnp.zeros((capacity.links + 6, LANES)).at[2].set(0.4).at[3].set(1.0)
     torque = jnp.concatenate([still[:6], 0.3 * bodies.strength.T[1:]])
     return stepped(
-        TreePlant(around),
+        plant,
         BodyState(qpos, still, still, still, jnp.ones(LANES), parameters=tree),
         torque,
     )
@@ -77,11 +80,14 @@ def main() -> None:
     parser.add_argument("--links", type=int, nargs="+", default=[12, 16], help="room of a body")
     options = parser.parse_args()
     water = Surroundings(floor=False, gravity=0.0, drag=300.0)
+    media = {"land": Surroundings(), "water": water}
     runs = {"tall quadruped": quadruped()}
     for links in options.links:
         capacity = Capacity(links=links)
-        runs[f"blocks, {links} links, land"] = blocks(capacity, Surroundings())
-        runs[f"blocks, {links} links, water"] = blocks(capacity, water)
+        for name, around in media.items():
+            runs[f"blocks, {links} links, {name}"] = blocks(capacity, around)
+            pushing = dataclasses.replace(around, collide=True)
+            runs[f"blocks, {links} links, {name}, collide"] = blocks(capacity, pushing)
     best = dict.fromkeys(runs, float("inf"))
     for _ in range(options.rounds):
         for name, run in runs.items():

@@ -68,6 +68,11 @@ def build(
             f"{folder}: {creature.name} with the task {title_of(champion.task)}; a robot is built "
             "of a body that grew to walk or jump: mjxgait train blocks --task walk"
         )
+    if champion.settings.touch:
+        raise UserError(
+            f"{folder}: its blocks feel each other (controller.touch), and a robot has no such "
+            "sensors; evolve without"
+        )
     with writing(place):
         place.mkdir(parents=True, exist_ok=True)
     walk = record_walk(creature, champion, SECONDS)

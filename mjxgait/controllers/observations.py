@@ -11,6 +11,7 @@ import numpy as np
 
 from mjxgait.creature.body import Body
 from mjxgait.errors import UserError, did_you_mean
+from mjxgait.physics.batched_trees.tree import ModularSensed
 from mjxgait.types import Sensed
 
 CONTACT_GAP = 0.002
@@ -132,8 +133,11 @@ def foot_heights(creature: Body, sensed: Sensed) -> jax.Array:
 
 
 def contacts(creature: Body, sensed: Sensed) -> jax.Array:
-    """Return 1 for each foot [F] in contact with the floor, else 0."""
-    return (foot_heights(creature, sensed) < CONTACT_GAP).astype(jnp.float32)
+    """Return 1 for each foot [F] in contact with the floor, or the block with another, else 0."""
+    gap, own = foot_heights(creature, sensed), sensed.body
+    if isinstance(own, ModularSensed) and own.nearest is not None:
+        gap = jnp.minimum(gap, own.nearest)
+    return (gap < CONTACT_GAP).astype(jnp.float32)
 
 
 def foot_geoms(creature: Body) -> list[slice]:

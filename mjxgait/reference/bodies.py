@@ -23,8 +23,9 @@ from mjxgait.reference.layout import (
     start_frame,
 )
 from mjxgait.reference.outcome import Fall
+from mjxgait.reference.own_contact import OwnContact
 from mjxgait.reference.starts import Starts, batch_of
-from mjxgait.reference.state import FOOT_SENSES, State
+from mjxgait.reference.state import FOOT_SENSES, OWN_CONTACT, State
 from mjxgait.reference.terrain import terrain_of
 
 PLACES = np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
@@ -144,6 +145,7 @@ class Bodies:
         self.last_force = np.zeros_like(self.qvel)
         self.sees_feet = any(name in FOOT_SENSES for name in reads)
         self.sees_light = "light" in reads
+        self.own = OwnContact(model, self.feet.geoms) if OWN_CONTACT in reads else None
         self.bath = Bath(model, self.batch, drag) if drag else None
         if self.bath is None:
             self._lift(model)
@@ -194,6 +196,7 @@ class Bodies:
             light=self.light(rows, time),
             goal=goal,
             bar=self.starts.bar[rows, 0],
+            own_gap=self.own_gap(rows),
         )
 
     def foot_height(self, rows: np.ndarray) -> np.ndarray:
@@ -210,6 +213,12 @@ class Bodies:
         if not self.sees_feet:
             return np.zeros((len(rows), 0, 3))
         return foot_middles(self.creature, self.geom_xpos[rows])
+
+    def own_gap(self, rows: np.ndarray) -> np.ndarray:
+        """Return distances [rows, F] in m of blocks from others of the body; empty if unused."""
+        if self.own is None:
+            return np.zeros((len(rows), 0))
+        return self.own.gaps(self.geom_xpos[rows], self.geom_xmat[rows])
 
     def light(self, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
         """Return the light's direction [rows, F, 3] in each foot's own axes; empty if unused.

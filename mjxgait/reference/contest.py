@@ -11,7 +11,8 @@ import numpy as np
 from mjxgait.creature import Creature
 from mjxgait.reference.controllers import Memory, ReferenceController
 from mjxgait.reference.layout import LowestPoint, own_directions
-from mjxgait.reference.state import CONTACT_GAP
+from mjxgait.reference.own_contact import OwnContact
+from mjxgait.reference.state import CONTACT_GAP, OWN_CONTACT
 
 
 class Contest:
@@ -63,6 +64,8 @@ class Opponent:
         model = contest.model
         self.dofs, self.places = model.jnt_dofadr[contest.joints], model.jnt_qposadr[contest.joints]
         self.blocks = LowestPoint(model, contest.geoms[1])
+        touches = OWN_CONTACT in controller.reads
+        self.own = OwnContact(model, contest.geoms[1]) if touches else None
 
     @property
     def states(self) -> tuple[np.ndarray, ...]:
@@ -81,10 +84,12 @@ class Opponent:
     def _senses(
         self, qpos: np.ndarray, xpos: np.ndarray, xmat: np.ndarray
     ) -> Mapping[str, np.ndarray]:
-        low = self.blocks.heights(xpos, xmat)
+        gap = self.blocks.heights(xpos, xmat)
+        if self.own is not None:
+            gap = np.minimum(gap, self.own.gaps(xpos, xmat))
         return {
             "joint_pos": qpos[:, self.places],
-            "contact": (low < CONTACT_GAP).astype(float),
+            "contact": (gap < CONTACT_GAP).astype(float),
             "light": self.contest.to_cube(xpos, xmat, self.contest.geoms[1]),
         }
 

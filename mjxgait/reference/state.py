@@ -27,6 +27,7 @@ class State:
     trunk_vel: [S, 3] m/s, trunk_angvel: [S, 3] rad/s, world frame.
     foot_height: [S, F] m, lowest point above the floor; empty if unused.
     foot_pos: [S, F, 3] m, middle of each foot; empty if unused.
+    own_gap: [S, F] m from each block to the nearest other one of its body; empty if unused.
     mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
     constraint_force: [S, nv], from the previous step.
     light: [S, F, 3] direction in the axes of each foot's geom, 0 without a light; empty if unused.
@@ -51,6 +52,7 @@ class State:
     bar: np.ndarray | None = None
     light: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
     foot_pos: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
+    own_gap: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
 
 
 Sense = Callable[[Creature, State], np.ndarray]
@@ -84,13 +86,19 @@ def _nose(creature: Creature, state: State) -> tuple[np.ndarray, np.ndarray]:
     return nose, np.cross([0.0, 0.0, 1.0], nose)
 
 
+def _contact(creature: Creature, state: State) -> np.ndarray:
+    """Return 1 for feet on the floor and, of bodies whose blocks observe it, on other blocks."""
+    gap = np.minimum(state.foot_height, state.own_gap) if state.own_gap.size else state.foot_height
+    return (gap < CONTACT_GAP).astype(float)
+
+
 SENSES: Mapping[str, Sense] = {
     "time": lambda creature, state: state.time,
     "beat": lambda creature, state: 2 * np.mod(state.time, 1.0) - 1,
     "joint_pos": lambda creature, state: state.joint_pos,
     "joint_vel": lambda creature, state: state.velocity[:, creature.joints.dof_adr],
     "foot_height": lambda creature, state: state.foot_height,
-    "contact": lambda creature, state: (state.foot_height < CONTACT_GAP).astype(float),
+    "contact": _contact,
     "trunk_pos": lambda creature, state: state.trunk_pos,
     "trunk_height": lambda creature, state: _height(state),
     "trunk_rot": lambda creature, state: state.trunk_rot,
@@ -132,6 +140,8 @@ ADDED: Mapping[str, Sense] = {
     "bar_distance": lambda creature, state: _left(state, state.bar),
 }
 """Observations added by shipped tasks (hop.md, limbo.md, follow.md in docs/reference/)."""
+OWN_CONTACT = "own_contact"
+"""Name among a controller's `reads` by which "contact" also answers to blocks of its own body."""
 FOOT_SENSES = ("foot_height", "contact", "foot_place")
 """Observations that need `foot_height` or `foot_pos`."""
 

@@ -41,7 +41,7 @@ class GraphGrowth(Growth[TreePlant, Genotype]):
 
     def body(self, plant: TreePlant, genome: Genotype, start: Starts) -> Starts:
         """Parts without a hinge are not bent; on land bodies rest on the ground."""
-        tree = body_of(genome.graph, self.capacity).tree
+        tree = plant.prepared(body_of(genome.graph, self.capacity).tree)
         bent = start.qpos[7:] * tree.moves[1:]
         qpos = jnp.concatenate([start.qpos[:7], bent])
         medium: Medium | None = start.ground
@@ -104,6 +104,8 @@ class GrownSpec:
             gravity=GRAVITY if False in media else 0.0,
             drag=DRAG if True in media else 0.0,
             lit="light" in task.adds,
+            collide=settings.collide,
+            touch=settings.touch,
         )
         plant, growth = TreePlant(around), GraphGrowth(capacity)
         given = (controller, task, config.rollout, LANES)

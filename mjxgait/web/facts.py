@@ -28,8 +28,9 @@ from mjxgait.reference.bodies import Water
 from mjxgait.reference.contest import contest_of
 from mjxgait.reference.controllers import reference_of
 from mjxgait.reference.layout import FLOOR, colliding_geoms, start_frame
+from mjxgait.reference.own_contact import OwnContact
 from mjxgait.reference.starts import nominal_starts
-from mjxgait.reference.state import FOOT_SENSES
+from mjxgait.reference.state import FOOT_SENSES, OWN_CONTACT
 from mjxgait.reference.stepping import examined_model
 from mjxgait.reference.terrain import BEHIND, CELLS, Terrain
 
@@ -78,6 +79,7 @@ def facts_of(creature: Creature, champion: Champion) -> Facts:
         "goal": float(aims.goal[0]),
         "bar": _bounded(aims.bar[0, 0]),
         "feet": _feet(creature, seen=any(name in FOOT_SENSES for name in reference.reads)),
+        "own_pairs": _own_pairs(model, np.array(creature.feet.stepping), reference.reads),
         "forbidden": _parts(model, creature.feet.watched_ids[watched:]),
         "fall": {
             "min_up": fall.min_up,
@@ -193,6 +195,13 @@ def _feet(creature: Creature, seen: bool) -> Facts:
     }
 
 
+def _own_pairs(
+    model: mujoco.MjModel, blocks: np.ndarray, reads: Sequence[str]
+) -> list[tuple[int, int]]:
+    """Pairs of blocks that feel each other; none if the controller does not observe it."""
+    return OwnContact(model, blocks).pairs if OWN_CONTACT in reads else []
+
+
 def _mirror(creature: Creature) -> Facts:
     mirror = creature.mirror
     return {"sign": mirror.sign.tolist(), "partner": list(mirror.partners)}
@@ -267,13 +276,15 @@ def _opponent(creature: Creature, champion: Champion) -> Facts | None:
     contest, model = contest_of(creature), creature.model
     if contest is None:
         return None
+    theirs = opponent_reference(creature, champion, float(model.opt.timestep))
     return {
-        "controller": _network(opponent_reference(creature, champion, float(model.opt.timestep))),
+        "controller": _network(theirs),
         "joints": {
             "qpos": model.jnt_qposadr[contest.joints].tolist(),
             "dofs": model.jnt_dofadr[contest.joints].tolist(),
         },
         "parts": _parts(model, contest.geoms[1].tolist()),
+        "own_pairs": _own_pairs(model, contest.geoms[1], theirs.reads),
         "cube": contest.cube,
     }
 

@@ -29,13 +29,10 @@ def remembers(body, champion):
     return bool(kept & set(brain.driver.tolist()))
 
 
-@functools.cache
-def with_a_brain(task):
-    """The first of a first population moved by the light and a neuron with memory, and its body."""
-    table = {
-        "use": {"controller": "brain", "task": task},
-        "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 3, "central": 2},
-    }
+def grown(task, **settings):
+    """All of a first population that have a hinge: bodies and champions."""
+    room = {"nodes": 3, "parts": 4, "links": 4, "local": 3, "central": 2}
+    table = {"use": {"controller": "brain", "task": task}, "controller": room | settings}
     experiment = build_experiment(
         load_creature(data_folder("envs") / "blocks"), build_config(table, task)
     )
@@ -44,14 +41,44 @@ def with_a_brain(task):
     state = dataclasses.replace(state, **known)
     for rank in range(len(state.fitness)):
         champion = experiment.champion(state, {}, rank)
-        with contextlib.suppress(UserError):  # some grow no hinge
-            body = champion.embodied(experiment.creature)
-            if not remembers(body, champion):
-                continue
+        with contextlib.suppress(UserError):
+            yield champion.embodied(experiment.creature), champion
+
+
+@functools.cache
+def with_a_brain(task):
+    """The first of a first population moved by the light and a neuron with memory, and its body."""
+    for body, champion in grown(task):
+        if remembers(body, champion):
             ends = [examined(body, champion, 1.0, None, None, light)[0][-1] for light in LIGHTS]
             if np.abs(ends[0] - ends[1]).max() > 0.01:
                 return body, champion
     raise AssertionError("none turns to the light")
+
+
+CONTACT_CODE = 4
+"""Source of a part's contact; see `Nerves`."""
+
+
+@functools.cache
+def that_feels_its_blocks():
+    """The first in water that a touch of two of its blocks moves otherwise, and its body.
+
+    The hinges of its root's children pull at full strength, all others as its blocks touch.
+    """
+    for body, plain in grown("follow", collide=True, touch=True):
+        source = np.full_like(plain.genome["nerves.effect_source"], CONTACT_CODE)
+        source[1] = 0
+        weight = np.ones_like(plain.genome["nerves.effect_weight"])
+        new = {"nerves.effect_source": source, "nerves.effect_weight": weight}
+        champion = dataclasses.replace(plain, genome=plain.genome | new)
+        numb = dataclasses.replace(
+            champion, settings=dataclasses.replace(champion.settings, touch=False)
+        )
+        ends = [examined(body, one, 3.0, None, None)[0][-1] for one in (champion, numb)]
+        if np.abs(ends[0] - ends[1]).max() > 0.01:
+            return body, champion
+    raise AssertionError("none feels its blocks")
 
 
 def examined(creature, champion, seconds, disturbed, push, light=None):

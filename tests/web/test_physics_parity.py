@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from helpers import altered, pose_champion
 from rendering.made_up import falling, treading
-from web.brains import examined, with_a_brain
+from web.brains import examined, that_feels_its_blocks, with_a_brain
 from web.engine import engine_folder, node
 
 from mjxgait.champion import serializer_of
@@ -147,6 +147,7 @@ CASES = {
     "a brain on land": lambda stool: (*with_a_brain("follow-on-land"), 5.0, DISTURBED, None),
     "two brains at a cube": lambda stool: (*two_brains(), 5.0, DISTURBED, None),
     "a brain in water": lambda stool: (*with_a_brain("follow"), 5.0, None, PUSH),
+    "a brain that feels its blocks": lambda stool: (*that_feels_its_blocks(), 5.0, None, None),
 }
 
 

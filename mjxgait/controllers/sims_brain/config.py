@@ -44,6 +44,10 @@ class BrainConfig:
         only the weights of `steer` change.
       steer: whether the light's direction also acts on each hinge directly, past the neurons; ours,
         not Sims'.
+      collide: whether the blocks of a body push each other in evolution, unless a single joint is
+        between them; otherwise they pass through each other. The examination always collides them.
+      touch: whether contact sensors answer to other blocks of the body, too, also in water; needs
+        `collide`.
       skills: effectors of each hinge, one for every skill of the task; they share body and neurons.
       skill: number of the effectors that act where the task does not choose them.
     """
@@ -66,11 +70,15 @@ class BrainConfig:
     grafting: Fraction = 0.3
     evolves: Annotated[Literal["all", "brain", "steering"], ADDED] = "all"
     steer: Annotated[bool, SHAPE, ADDED] = False
+    collide: Annotated[bool, SHAPE, ADDED] = False
+    touch: Annotated[bool, SHAPE, ADDED] = False
     skills: Annotated[Room, ADDED] = 1
     skill: Annotated[int, pydantic.Field(ge=0), SHAPE, ADDED] = 0
 
     def __post_init__(self) -> None:
         if self.evolves == "steering" and not self.steer:
             raise ValueError('evolves = "steering" needs steer = true')
+        if self.touch and not self.collide:
+            raise ValueError("touch = true needs collide = true")
         if self.skill >= self.skills:
             raise ValueError(f"skill = {self.skill} needs skills = {self.skill + 1} or more")

@@ -52,7 +52,8 @@ def arena_of(
     theirs = genome.opponent
     assert theirs is not None
     own, other = grown_both(genome.graph, theirs.graph, controller.capacity)
-    trees = jax.tree.map(lambda a, b: jnp.stack([a, b]), own.tree, other.tree)
+    mine_tree, its_tree = plant.prepared(own.tree), plant.prepared(other.tree)
+    trees = jax.tree.map(lambda a, b: jnp.stack([a, b]), mine_tree, its_tree)
     mine, its = jax.vmap(reach)(trees)
     still, none, half = jnp.zeros(own.tree.links - 1), jnp.zeros(()), CUBE / 2
     middle = mine + DISTANCE + half
@@ -63,11 +64,11 @@ def arena_of(
     cube = jnp.stack([middle, none, none + half])
     cube = jnp.concatenate([cube, jnp.asarray([1.0, 0.0, 0.0, 0.0, 0.0])])
     arena = Arena(
-        opponent=resting(other.tree, rested[1]),
-        cube=resting(cube_tree(CUBE, CUBE_DENSITY), cube),
+        opponent=resting(its_tree, rested[1]),
+        cube=resting(plant.prepared(cube_tree(CUBE, CUBE_DENSITY)), cube),
         brain=wired(theirs.nerves, theirs.centre, other, controller.room),
         mind=controller.init(),
         torque=still,
         count=jnp.int32(0),
     )
-    return own.tree, rested[0], arena
+    return mine_tree, rested[0], arena

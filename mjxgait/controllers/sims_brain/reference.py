@@ -20,6 +20,7 @@ from mjxgait.controllers.sims_brain.reference_body import (
 )
 from mjxgait.creature import Creature
 from mjxgait.reference.controllers import Command, Memory
+from mjxgait.reference.state import OWN_CONTACT
 
 CENTRE = -1
 LIGHT = (4, 5, 6)
@@ -101,11 +102,10 @@ class BrainReference:
     A wire leads from a column to a neuron or a hinge. The columns: nothing, the constant 1, the
     angles of all hinges, contact and light of all parts, the values of all neurons. lit: [J, 3]
     columns of the light that steers each hinge. steer: see `Nerves`; None without. skill: number of
-    the effectors that act.
+    the effectors that act. touch: whether contact is also that with other blocks of the body.
     """
 
     command: ClassVar[Command] = "torque"
-    reads: ClassVar[tuple[str, ...]] = ("joint_pos", "contact", "light")
 
     def __init__(
         self,
@@ -115,7 +115,10 @@ class BrainReference:
         step: float,
         every: int = 1,
         skill: int = 0,
+        touch: bool = False,
     ) -> None:
+        senses = ("joint_pos", "contact", "light")
+        self.reads: tuple[str, ...] = (*senses, OWN_CONTACT) if touch else senses
         self.genome, self.parts, self.hinges = genome, parts, tuple(hinges)
         self.every, self.pause = every, step * every
         self.local, self.skill = genome["nerves.kind"].shape[1], skill
@@ -265,4 +268,5 @@ def _reference(
     parts = grow(genome, settings.parts, settings.links)
     numbers = [name.removeprefix("part").split("_") for name in names]
     hinges = [(int(part), int(hinge)) for part, hinge in numbers]
-    return BrainReference(genome, parts, hinges, step, settings.every, settings.skill)
+    every, skill, touch = settings.every, settings.skill, settings.touch
+    return BrainReference(genome, parts, hinges, step, every, skill, touch)

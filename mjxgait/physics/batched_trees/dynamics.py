@@ -227,7 +227,7 @@ def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
         for k, normal in enumerate(normals)
     ]
     end = jnp.minimum(jnp.minimum(into[0], into[1]), into[2])
-    joints, both = _joints_between(tree), tree.solid[:, None] * tree.solid[None] > 0
+    joints, both = joints_between(tree), tree.solid[:, None] * tree.solid[None] > 0
     within = jnp.where(both & (joints > 1), depth, -FAR)
     joined = both & (joints == 1) & (tree.above > 0)
     return jnp.max(jnp.where(joined, end, within) / least, axis=(0, 1))
@@ -238,7 +238,7 @@ def sizes(tree: Tree) -> jax.Array:
     return 2 * jnp.cbrt(tree.half[:, 0] * tree.half[:, 1] * tree.half[:, 2])
 
 
-def _joints_between(tree: Tree) -> jax.Array:
+def joints_between(tree: Tree) -> jax.Array:
     """Return the number of joints between two blocks, [n, n, L]."""
     joint = tree.solid * tree.moves
     between = abs(tree.above[:, None] - tree.above[None])

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from typing_extensions import override
 
+from mjxgait.physics.batched_trees import within
 from mjxgait.physics.batched_trees.dynamics import (
     bias_links,
     deepest,
@@ -193,7 +194,8 @@ class Moment:
     """Step data of the current state.
 
     turns: [3, 3, L] the root's axes. freedom: components [n, L] of each hinge's motion.
-    mass: rows. bias: [nv, L]. touch: None without a floor.
+    mass: rows. bias: [nv, L]. touch: None without a floor. within: of the blocks with each other;
+    None if they pass through each other.
     """
 
     turns: jax.Array
@@ -201,6 +203,7 @@ class Moment:
     mass: Rows
     bias: jax.Array
     touch: Touch | None
+    within: within.OwnTouch | None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -223,6 +226,12 @@ class TreePlant(Plant[Moment]):
         """Any pose counts, because these bodies have no drawn pose."""
         tree: Tree = state.parameters
         return deepest(tree, posture(tree, state.qpos, pinned_by(state.friction)))
+
+    def prepared(self, tree: Tree) -> Tree:
+        """Return one body, arrays without lanes, with the pairs of blocks that push each other."""
+        if not self.around.collide:
+            return tree
+        return dataclasses.replace(tree, meets=within.meeting(tree))
 
     def rested(self, tree: Tree, qpos: jax.Array) -> jax.Array:
         """Raise or lower the start [nq] of one body, arrays without lanes, onto the ground."""
@@ -263,9 +272,16 @@ class TreePlant(Plant[Moment]):
             mass=mass_rows(tree, turns, freedom, body, pin),
             bias=pin(bias + resisted),
             touch=pin(self._touch(tree, poses, medium)) if around.floor else None,
+            within=within.touches(tree, poses, pin) if around.collide else None,
         )
         momentum = jnp.stack([jnp.sum(x, axis=0) for x in body.times(unpack(moving)).shift])
-        return self._sensed(state, poses, moving, moment.bias, momentum, washed), moment
+        sensed = self._sensed(state, poses, moving, moment.bias, momentum, washed)
+        if around.touch and moment.within is not None:
+            near = within.nearest(moment.within, tree.links)
+            sensed = dataclasses.replace(
+                sensed, body=dataclasses.replace(sensed.body, nearest=near)
+            )
+        return sensed, moment
 
     def _touch(self, tree: Tree, poses: Sequence[Pose], medium: Medium | None) -> Touch:
         touch = lowest_corners(tree, poses)
@@ -322,7 +338,13 @@ class TreePlant(Plant[Moment]):
         constraints = make_constraints(
             tree, self.around, footing, touch, state.friction, state.qpos, state.qvel
         )
-        problem = Problem(moment.mass, list(torque - moment.bias), constraints, pin)
+        force = torque - moment.bias
+        if moment.within is not None:
+            pushing = within.Pushing(
+                tree, moment.turns, freedom, moment.mass, moment.within, step, pin
+            )
+            force = force + pushing.force(state.qvel, list(force))
+        problem = Problem(moment.mass, list(force), constraints, pin)
         acceleration, pushed = constrained_acceleration(problem, list(state.warmstart))
         warmstart = jnp.stack(acceleration)
         qvel = state.qvel + step * warmstart

@@ -40,6 +40,8 @@ class ModularSensed:
     limit_excess: [] rad, largest excess of a hinge beyond its range.
     depth: [] of the deepest block in the ground, in units of the block's size (the cube root of its
     volume); negative where all are above.
+    nearest: [G] m from each watched block to the nearest other one of its body that it can push,
+    along their normals, negative inside it; None where nothing senses it.
     geom_rot: [G, 3, 3], rows are the own axes of each watched block in the world; only where vision
     needs it.
     cube: [3] m, middle of the cube of a contest. gaps: [2] m from there to the nearest block of the
@@ -51,6 +53,7 @@ class ModularSensed:
     water_force: jax.Array
     limit_excess: jax.Array
     depth: jax.Array
+    nearest: jax.Array | None = None
     geom_rot: jax.Array | None = None
     cube: jax.Array | None = None
     gaps: jax.Array | None = None
@@ -72,6 +75,7 @@ class Tree:
     link with a block.
     armature: [n] kg·m²; damping: [n] N·m·s/rad; low, high: [n] rad, where limits' springs begin.
     body_weight: [n] 1/kg, dof_weight: [n] 1/(kg·m²), as MuJoCo's `invweight0`.
+    meets: [n, n] 1 where two blocks push each other; None if all pass through each other.
     """
 
     parent: jax.Array
@@ -91,6 +95,7 @@ class Tree:
     high: jax.Array
     body_weight: jax.Array
     dof_weight: jax.Array
+    meets: jax.Array | None = None
 
     @property
     def links(self) -> int:
@@ -113,7 +118,9 @@ class Surroundings:
 
     step: s. friction: of the ground. contact: s, time constant of a contact (`solref`). floor:
     whether there is one, z = 0. gravity: m/s². drag: N·s/m³, the resistance of a face to its normal
-    velocity, per area; 0 without water. lit: whether there is a light to sense.
+    velocity, per area; 0 without water. lit: whether there is a light to sense. collide: whether
+    the blocks of a body push each other, unless a single joint is between them. touch: whether to
+    sense how near they are.
     iterations, line_iterations: of the contact solver.
     """
 
@@ -126,6 +133,8 @@ class Surroundings:
     iterations: int = 3
     line_iterations: int = 6
     lit: bool = False
+    collide: bool = False
+    touch: bool = False
 
 
 @dataclasses.dataclass(frozen=True)

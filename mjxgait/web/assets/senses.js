@@ -33,10 +33,10 @@ export function senses(simulation) {
 
 // Observations of the opponent in a contest.
 export function opponentSenses(simulation) {
-  const { joints, parts } = simulation.facts.opponent;
+  const { joints, parts, own_pairs } = simulation.facts.opponent;
   return {
     joint_pos: joints.qpos.map(adr => simulation.data.qpos[adr]),
-    contact: parts.map(part => touches(simulation.height(part))),
+    contact: contacts(simulation, parts, parts.map(part => simulation.height(part)), own_pairs),
     light: parts.map(({ geom }) => towardsLight(simulation, geom)),
   };
 }
@@ -86,7 +86,7 @@ function footSenses(simulation, place, nose, beside) {
   return {
     light: feet.parts.flat().map(({ geom }) => towardsLight(simulation, geom)),
     foot_height,
-    contact: foot_height.map(touches),
+    contact: contacts(simulation, feet.parts.flat(), foot_height, simulation.facts.own_pairs),
     foot_place: feet.parts.map(geoms => {
       const away = minus(middle(geoms), place);
       return [dot(away, nose), dot(away, beside)];
@@ -94,7 +94,30 @@ function footSenses(simulation, place, nose, beside) {
   };
 }
 
-const touches = height => (height < CONTACT_GAP ? 1 : 0);
+// 1 for each block on the floor or near another one, else 0. pairs: of blocks that feel each other.
+function contacts({ data }, parts, heights, pairs) {
+  const gaps = [...heights];
+  for (const [i, j] of pairs) {
+    const apart = Math.max(beyond(data, parts[i], parts[j]), beyond(data, parts[j], parts[i]));
+    gaps[i] = Math.min(gaps[i], apart);
+    gaps[j] = Math.min(gaps[j], apart);
+  }
+  return gaps.map(gap => (gap < CONTACT_GAP ? 1 : 0));
+}
+
+// Distance of a second box from a first along the first one's normals; negative within all three.
+function beyond(data, one, other) {
+  const between = minus(three(data.geom_xpos, one.geom), three(data.geom_xpos, other.geom)),
+    [own, its] = [one, other].map(({ geom }) => columns(data.geom_xmat, geom));
+  const away = own.map((axis, k) => {
+    const reach = its.reduce((sum, edge, m) => sum + Math.abs(dot(axis, edge)) * other.box[m], 0);
+    return Math.abs(dot(axis, between)) - one.box[k] - reach;
+  });
+  return Math.max(...away);
+}
+
+const columns = (xmat, geom) =>
+  [0, 1, 2].map(column => [0, 3, 6].map(row => xmat[9 * geom + row + column]));
 
 // Direction [3] of the light in a geom's own axes; zero in the dark. In a contest it is the cube.
 function towardsLight(simulation, geom) {

@@ -1,4 +1,7 @@
-"""Modular swimmers whose bodies and brains evolve, through the same run as all creatures."""
+"""Modular swimmers whose bodies and brains evolve, through the same run as all creatures.
+
+Their blocks push and feel each other, which other tests leave at the default.
+"""
 
 import dataclasses
 import json
@@ -37,7 +40,15 @@ from mjxgait.training.logs import Line, write_lines
 
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},
-    "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
+    "controller": {
+        "nodes": 3,
+        "parts": 4,
+        "links": 4,
+        "local": 2,
+        "central": 1,
+        "collide": True,
+        "touch": True,
+    },
     "evolution": {"population": 60, "lineage": True},
     "rollout": {"seconds": 1.6, "starts": 2, "promote": 1.0, "lanes": 20, "joint_noise": 0.1},
     "fitness": {"settle": 0.1, "weights": {"overlap": 0.0, "elsewhere": 0.0}},
