@@ -7,12 +7,13 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from controllers.sims_brain.made_up import CALM, bodies_of, genome_of, one, random_graphs
 from controllers.sims_brain.made_up import LANES as BODIES
-from controllers.sims_brain.made_up import bodies_of, genome_of, one, random_graphs
 from physics.test_blocks_physics import links_of, moments
 
+from mjxgait.controllers.observations import CONTACT_GAP, contacts
 from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
-from mjxgait.controllers.sims_brain.phenotype import GrownBody
+from mjxgait.controllers.sims_brain.phenotype import GrownBody, anatomy
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.controllers.sims_brain.reference_files import body_xml
 from mjxgait.physics.batched_trees.plant import TreePlant
@@ -26,8 +27,12 @@ ADRIFT = Surroundings(step=0.005, contact=0.01, floor=False, gravity=0.0)
 
 
 @cache
-def folded(collide: bool) -> np.ndarray:
-    """Deepest contact of each body's blocks over their size, after its hinges pulled for 1 s."""
+def folded(collide: bool) -> tuple[np.ndarray, np.ndarray]:
+    """What remains after all hinges pulled for 1 s.
+
+    Deepest contact of each body's blocks over their size, and its momentum [3, BODIES] over its
+    mass, in m/s.
+    """
     plant = TreePlant(dataclasses.replace(ADRIFT, collide=collide))
     graphs = random_graphs(1)
     bodies = bodies_of(graphs, CAPACITY)
@@ -47,7 +52,9 @@ def folded(collide: bool) -> np.ndarray:
         return jax.lax.fori_loop(0, 200, one_step, state)
 
     after = run(state)
-    return np.array([depth(one(graphs, k), one(bodies, k), after, k) for k in range(BODIES)])
+    depths = [depth(one(graphs, k), one(bodies, k), after, k) for k in range(BODIES)]
+    momentum = jax.jit(plant.forward)(after)[0].body.momentum / jnp.sum(tree.mass, axis=0)
+    return np.array(depths), np.asarray(momentum)
 
 
 def placed(
@@ -80,11 +87,24 @@ def depth(graph: Graph, body: GrownBody, state: BodyState, lane: int) -> float:
 
 
 def test_bodies_that_fold_stay_out_of_themselves():
-    free, held = folded(False), folded(True)
+    free, held = folded(False)[0], folded(True)[0]
 
     assert (free > 0.2).sum() > 5
     assert (held < 0.05).mean() > 0.95
     assert held.max() < 0.2
+
+
+def test_blocks_that_push_each_other_move_no_body():
+    assert np.abs(folded(True)[1]).max() < 5 * np.abs(folded(False)[1]).max() + 1e-3
+
+
+def test_contact_is_that_with_the_ground_or_another_block():
+    body, gap = anatomy(3), 0.5 * CONTACT_GAP
+    low, near = jnp.array([gap, 1.0, 1.0]), jnp.array([1.0, gap, 1.0])
+    for nearest, contact in ((None, [1, 0, 0]), (near, [1, 1, 0])):
+        own = dataclasses.replace(CALM.body, nearest=nearest)
+        sensed = dataclasses.replace(CALM, geom_low=low, body=own)
+        np.testing.assert_array_equal(contacts(body, sensed), contact)
 
 
 def test_blocks_sense_how_near_others_are():

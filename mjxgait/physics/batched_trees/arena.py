@@ -24,7 +24,6 @@ from mjxgait.physics.batched_trees.tree import (
     lows,
     posture,
 )
-from mjxgait.physics.lane_major.kinematics import Motion
 from mjxgait.physics.lane_major.lanes import (
     axes,
     cross,
@@ -211,18 +210,13 @@ def _with_cube(sensed: Sensed, place: jax.Array, gaps: jax.Array) -> Sensed:
     return dataclasses.replace(sensed, body=dataclasses.replace(own, cube=place, gaps=gaps))
 
 
-def _freedom(moment: Moment) -> Motion:
-    x, y, z, *shift = moment.freedom
-    return Motion((x, y, z), (shift[0], shift[1], shift[2]))
-
-
 def _boxes(state: BodyState, sensed: Sensed, moment: Moment) -> Boxes:
     """Return the blocks of a body in the world."""
     tree: Tree = state.parameters
     own: ModularSensed = sensed.body
     assert own.geom_rot is not None
     pin, middle = pinned_by(state.friction), axes(sensed.geom_pos)
-    moving = velocities(tree, moment.turns, _freedom(moment), list(state.qvel), pin)
+    moving = velocities(tree, moment.turns, moment.motion, list(state.qvel), pin)
     spin, slide = axes(moving), axes(moving[:, 3:])
     x, y, z = (m - state.qpos[c] for c, m in enumerate(middle))
     drift = plus(slide, cross(spin, (x, y, z)))
@@ -253,4 +247,4 @@ def _projected(state: BodyState, moment: Moment, boxes: Boxes, force: jax.Array)
     x, y, z = (m - state.qpos[c] for c, m in enumerate(boxes.middle))
     about_root = plus(axes(force), cross((x, y, z), pull))
     wrench = pin(jnp.stack([*about_root, *pull], axis=1))
-    return generalised(state.parameters, moment.turns, _freedom(moment), wrench, pin)
+    return generalised(state.parameters, moment.turns, moment.motion, wrench, pin)

@@ -65,6 +65,12 @@ class Moment:
     touch: Touch | None
     within: within.OwnTouch | None
 
+    @property
+    def motion(self) -> Motion:
+        """Each hinge's motion."""
+        x, y, z, *shift = self.freedom
+        return Motion((x, y, z), (shift[0], shift[1], shift[2]))
+
 
 @dataclasses.dataclass(frozen=True)
 class TreePlant(Plant[Moment]):
@@ -191,8 +197,7 @@ class TreePlant(Plant[Moment]):
     def _advance(self, state: BodyState, moment: Moment, torque: jax.Array) -> BodyState:
         tree: Tree = state.parameters
         step, touch, pin = self.around.step, moment.touch, pinned_by(state.friction)
-        spin_x, spin_y, spin_z, *shift = moment.freedom
-        freedom = Motion((spin_x, spin_y, spin_z), (shift[0], shift[1], shift[2]))
+        freedom = moment.motion
         points = (moment.turns[0],) * 3 if touch is None else touch.points
         footing = BlockFooting(tree, moment.turns, freedom, points, pin)
         constraints = make_constraints(

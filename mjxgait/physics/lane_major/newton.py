@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.physics.lane_major.constraints import Constraints
-from mjxgait.physics.lane_major.lanes import Pin
+from mjxgait.physics.lane_major.lanes import Pin, dot, minus
 from mjxgait.physics.lane_major.treematrix import (
     Rows,
     factor,
@@ -152,15 +152,6 @@ def _folded(parts: Sequence[jax.Array]) -> Lanes:
     return sum(ends[1:], ends[0])
 
 
-def _dot(a: Sequence[Lanes], b: Sequence[Lanes]) -> Lanes:
-    terms = [x * y for x, y in zip(a, b, strict=True)]
-    return sum(terms[1:], terms[0])
-
-
-def _minus(a: Sequence[Lanes], b: Sequence[Lanes]) -> list[Lanes]:
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
 def _constraint_force(problem: Problem, at: Iterate) -> list[Lanes]:
     """J^T f with f = -D times the negative residuals."""
     c = problem.constraints
@@ -187,7 +178,7 @@ def _improved(problem: Problem, at: Iterate) -> Iterate:
     """Take one Newton step with exact line search."""
     c, pin = problem.constraints, problem.pin
     pattern = c.structure.pattern
-    uphill = _minus(_minus(at.inertial, problem.force), _constraint_force(problem, at))
+    uphill = minus(minus(at.inertial, problem.force), _constraint_force(problem, at))
     step = solve(pattern, factor(pattern, _hessian(problem, at)), [-g for g in uphill])
     inertial = pin(multiply(pattern, problem.mass, step))
     change = c.along(step)
@@ -233,8 +224,8 @@ def _line_search(
     Newton on its derivative, which grows piecewise linearly, kept in a bracket.
     """
     c, pin = problem.constraints, problem.pin
-    slope = pin(_dot(step, _minus(at.inertial, problem.force)))
-    curvature = pin(_dot(step, inertial))
+    slope = pin(dot(step, minus(at.inertial, problem.force)))
+    curvature = pin(dot(step, inertial))
     residuals, changes, weights = _edges(c, at.residuals), _edges(c, change), _weights(c)
 
     def derivatives(length: Lanes) -> tuple[Lanes, Lanes]:
