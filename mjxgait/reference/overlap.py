@@ -94,15 +94,16 @@ def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int
     """Return pairs of bodies joined by one joint or by several at one place; welded bodies are one.
 
     In a planar body, pairs of limbs with parallel axes are included: they can only pass each other.
-    MuJoCo excludes parent and child by itself; they are listed all the same. So are pairs of a part
-    and one of an opponent: to touch it is no overlap.
+    MuJoCo excludes parent and child by itself; they are listed all the same. So are pairs with a
+    part of an opponent: to touch it is no overlap, and its own overlap is not the creature's.
     """
     data = posed(model, creature.stand_qpos)
     chains = [_chain(model, body) for body in range(model.nbody)]
+    own = model.body_rootid == model.body_rootid[creature.trunk]
 
     def joined(one: int, other: int) -> bool:
         between = chains[one] ^ chains[other]
-        if len(between) < 2 or model.body_rootid[one] != model.body_rootid[other]:
+        if len(between) < 2 or not (own[one] and own[other]):
             return True
         joints = np.isin(model.jnt_bodyid, list(between))
         reach = np.linalg.norm(np.ptp(data.xanchor[joints], axis=0))
