@@ -305,5 +305,11 @@ def _brain(design: Design, step: float) -> BrainReference:
     hinges = [(part, int(name.rpartition("_")[2])) for name, part in hinge_names(design.parts)]
     settings = champion.settings
     return BrainReference(
-        champion.genome, design.parts, hinges, step, settings.every, settings.skill
+        champion.genome,
+        design.parts,
+        hinges,
+        step,
+        every=settings.every,
+        skill=settings.skill,
+        children=settings.children,
     )

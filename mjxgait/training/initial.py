@@ -41,7 +41,8 @@ class Initial:
 
     Attributes:
       source: folder of that run, or of the first. controller, reads: its controller and what that
-        observes. joints: names of the body's joints; empty for bodies that grow.
+        observes. joints: names of the body's joints; empty for bodies that grow. meaning: see
+        `_meaning_of`.
       genomes: best first; of several runs first the best of each, then each second best.
     """
 
@@ -49,6 +50,7 @@ class Initial:
     controller: str
     reads: tuple[str, ...]
     joints: tuple[str, ...]
+    meaning: Mapping[str, object]
     genomes: Genomes
 
 
@@ -71,8 +73,14 @@ def initial_of(source: Path) -> Initial:
     for observation, names in _genes_of(controller).items():
         if observation not in controller.reads:
             found = {k: array for k, array in found.items() if not k.startswith(tuple(names))}
-    reads = tuple(controller.reads)
-    return Initial(source, config.use.controller, reads, _joints(creature), found)
+    return Initial(
+        source,
+        config.use.controller,
+        tuple(controller.reads),
+        _joints(creature),
+        _meaning_of(controller),
+        found,
+    )
 
 
 def united(sources: Sequence[Path]) -> Initial:
@@ -120,6 +128,12 @@ def check_initial(initial: Initial, experiment: Experiment) -> None:
             f"{initial.source}: its controller observes {', '.join(initial.reads)}, that of the "
             f"new run {', '.join(controller.reads)}; take a run with the same observations"
         )
+    for setting, value in _meaning_of(controller).items():
+        if (other := initial.meaning.get(setting)) != value:
+            raise UserError(
+                f"{initial.source}: its genomes are of {setting} = {other}, those of the new run "
+                f"of {value}, and would mean something else; give the new run --{setting} {other}"
+            )
     wanted, found = _shapes(by_name(experiment.abstract().genomes)), _shapes(initial.genomes)
     wanted = _without_idle(wanted, found, controller)
     if name := first_difference(found, wanted):
@@ -175,6 +189,12 @@ def _genes_of(controller: object) -> Mapping[str, Sequence[str]]:
     Only bodies that grow have some: their tasks differ in what a brain observes.
     """
     found: Mapping[str, Sequence[str]] = getattr(controller, "genes_of", {})
+    return found
+
+
+def _meaning_of(controller: object) -> Mapping[str, object]:
+    """Return the settings, by dotted name, without which a genome of one shape is ambiguous."""
+    found: Mapping[str, object] = getattr(controller, "meaning", {})
     return found
 
 

@@ -15,6 +15,7 @@ from rendering.made_up import treading, write_run
 
 from mjxgait.champion import write_champion
 from mjxgait.config.layers import find_creature
+from mjxgait.controllers.sims_brain.reference import brain_reference
 from mjxgait.creature import load_creature
 from mjxgait.creature.geometry import posed
 from mjxgait.hardware import robot
@@ -54,6 +55,15 @@ def test_the_body_at_its_own_size_moves_as_in_the_reference_simulator(
     steps = round(SHORT / crawl().time_step)
     assert np.abs(crawl().qpos[:steps, 7:]).max() > 0.2
     assert np.allclose(seen[1 : steps + 1], crawl().qpos[:steps], atol=1e-4)
+
+
+def test_its_parts_hear_as_many_children_as_in_the_reference_simulator():
+    settings = dataclasses.replace(champion().settings, children=2)
+    best = dataclasses.replace(champion(), settings=settings)
+    design = dataclasses.replace(at(0), walk=dataclasses.replace(crawl(), champion=best))
+    examined = brain_reference(best.embodied(load_creature(find_creature("blocks"))), best, 0.01)
+    assert robot._brain(design, 0.01).heard == examined.heard
+    assert {len(own) for own in examined.heard} == {2}
 
 
 @pytest.mark.parametrize("length", [0.10, 0.20])

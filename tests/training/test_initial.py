@@ -15,9 +15,16 @@ from mjxgait.config.schema import Config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.training import loop, stages
-from mjxgait.training.experiment import build_experiment
+from mjxgait.training.experiment import arrays_of, build_experiment
 from mjxgait.training.folder import create_run
-from mjxgait.training.initial import INITIAL, initial_of, planted, read_initial
+from mjxgait.training.initial import (
+    INITIAL,
+    Initial,
+    check_initial,
+    initial_of,
+    planted,
+    read_initial,
+)
 from mjxgait.training.logs import read_metrics
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import read_stored
@@ -118,6 +125,21 @@ def test_another_body_is_refused(first: Path, tmp_path: Path):
     crab = load_creature(STOOL.parents[2] / "envs" / "crab")
     with pytest.raises(UserError, match="its body has other joints"):
         train(tmp_path / "run", crab, config(), first)
+
+
+def test_genomes_of_a_brain_that_hears_more_children_are_refused():
+    """Their arrays have the shapes of the new run, but the numbers of sources are others."""
+    blocks = load_creature(STOOL.parents[2] / "envs" / "blocks")
+    settings = mjxgait.plugins.resolve_config(blocks.settings.train, "blocks")
+    hearing = dataclasses.replace(settings.controller, children=3)
+    own = build_experiment(blocks, settings)
+    other = build_experiment(blocks, dataclasses.replace(settings, controller=hearing))
+    controller = own.simulator.controller
+    genomes = arrays_of(own.init().genomes)
+    came = Initial(Path("hens"), "brain", controller.reads, (), controller.meaning, genomes)
+    check_initial(came, own)
+    with pytest.raises(UserError, match=r"hens: .* controller\.children = 1, .* new run of 3"):
+        check_initial(came, other)
 
 
 def test_a_damaged_file_is_one_sentence(second: Path, tmp_path: Path):

@@ -9,7 +9,8 @@ part, the central ones last. A part's contact and light are those of the link th
 block.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import islice
 
 import jax
 import jax.numpy as jnp
@@ -176,7 +177,7 @@ def _places(body: GrownBody, room: NerveRoom) -> jax.Array:
         return jnp.where(there[:, None], first + part[:, None] * local + jnp.arange(local), NOTHING)
 
     is_child = parts.exists & (jnp.arange(count) > 0)
-    children = is_child & (parts.parent == every)
+    heard = islice(_in_order(is_child & (parts.parent == every)), room.children)
     central = (
         first + count * local + jnp.broadcast_to(jnp.arange(room.central), (count, room.central))
     )
@@ -187,12 +188,24 @@ def _places(body: GrownBody, room: NerveRoom) -> jax.Array:
         light,
         neurons(jnp.arange(count), parts.exists),
         neurons(parts.parent, is_child),
-        neurons(children.argmax(1), children.any(1)),
+        *(neurons(child, there) for child, there in heard),
         central,
     ]
     found = jnp.concatenate(columns, axis=1)
-    assert found.shape[1] == room.codes == 1 + SENSORS + 3 * local + room.central
+    known = 1 + SENSORS + (2 + room.children) * local + room.central
+    assert found.shape[1] == room.codes == known
     return found
+
+
+def _in_order(children: jax.Array) -> Iterator[tuple[jax.Array, jax.Array]]:
+    """Yield each part's first child [P], then its second, and so on, and whether [P] it has one.
+
+    children: [P, P], whether the second part is a child of the first.
+    """
+    while True:
+        first = children.argmax(1)
+        yield first, children.any(1)
+        children = children & (jnp.arange(len(children)) != first[:, None])
 
 
 TICKS = 2

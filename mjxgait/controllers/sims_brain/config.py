@@ -28,6 +28,8 @@ class BrainConfig:
       parts: most parts of a body.
       links: most links of a body; a part needs a link per hinge, and at least one.
       local: neurons of each node.
+      children: child parts whose neurons a part can hear, the first ones in order of growth. A node
+        with 3 connections has 6 child parts at most, for each may grow a mirrored pair.
       central: neurons of no node.
       every: control steps per command; a brain takes two steps of its own per command.
       values: number of values that change in a mutation, on average.
@@ -58,6 +60,7 @@ class BrainConfig:
     parts: Room = 12
     links: Annotated[int, pydantic.Field(ge=2), SHAPE] = 12
     local: Room = 3
+    children: Annotated[Room, ADDED] = 1
     central: Room = 4
     every: Annotated[int, pydantic.AfterValidator(check_every), SHAPE] = 4
     values: NonNegative = 8.0

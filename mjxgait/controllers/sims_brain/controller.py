@@ -62,8 +62,16 @@ class Brains:
     def __init__(self, step: float, settings: BrainConfig, added: Sequence[str] = ()) -> None:
         self.every, self.capacity = settings.every, capacity_of(settings)
         self.pause = step * settings.every
-        self.room = NerveRoom(settings.local, settings.central, settings.steer, settings.skills)
+        self.room = NerveRoom(
+            local=settings.local,
+            central=settings.central,
+            steer=settings.steer,
+            skills=settings.skills,
+            children=settings.children,
+        )
         self.skill = settings.skill
+        # Numbers of sources count what a part can hear, and the arrays that hold them do not show it.
+        self.meaning = {"controller.children": settings.children}
         known = (LIGHT, SKILL, OPPONENT)
         self.reads = ("joint_pos", "contact", *(name for name in known if name in added))
 

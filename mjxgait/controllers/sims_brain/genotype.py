@@ -152,17 +152,21 @@ constant frequency drives only one effector in 400."""
 
 @dataclasses.dataclass(frozen=True)
 class NerveRoom:
-    """Numbers of neurons per node, and of central neurons. steer, skills: see `BrainConfig`."""
+    """Numbers of neurons per node, and of central neurons.
+
+    steer, skills, children: see `BrainConfig`.
+    """
 
     local: int = BrainConfig.local
     central: int = BrainConfig.central
     steer: bool = BrainConfig.steer
     skills: int = BrainConfig.skills
+    children: int = BrainConfig.children
 
     @property
     def codes(self) -> int:
         """Number of source codes; see `Nerves`."""
-        return 1 + SENSORS + 3 * self.local + self.central
+        return 1 + SENSORS + (2 + self.children) * self.local + self.central
 
 
 @pytree
@@ -174,7 +178,7 @@ class Nerves:
     other_weight: [N, 3, S - 1] the same for the other skills; None without.
 
     A source is a number: 0 for the constant 1; then the part's own sensors, its own neurons, its
-    parent's, its first child's, and the central ones.
+    parent's, those of its first `NerveRoom.children` children in order, and the central ones.
     steer: [N, 3, 2, 3] weights by which the light's direction, along the axes of the part's block,
     adds to each hinge's drive and changes its size; None without `NerveRoom.steer`.
     """

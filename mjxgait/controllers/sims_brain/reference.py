@@ -103,6 +103,7 @@ class BrainReference:
     angles of all hinges, contact and light of all parts, the values of all neurons. lit: [J, 3]
     columns of the light that steers each hinge. steer: see `Nerves`; None without. skill: number of
     the effectors that act. touch: whether contact is also that with other blocks of the body.
+    children: number of child parts that a part can hear.
     """
 
     command: ClassVar[Command] = "torque"
@@ -116,6 +117,7 @@ class BrainReference:
         every: int = 1,
         skill: int = 0,
         touch: bool = False,
+        children: int = 1,
     ) -> None:
         senses = ("joint_pos", "contact", "light")
         self.reads: tuple[str, ...] = (*senses, OWN_CONTACT) if touch else senses
@@ -126,9 +128,7 @@ class BrainReference:
         neurons = [*owned, *((CENTRE, q) for q in range(len(genome["centre.kind"])))]
         first = 2 + len(hinges) + 4 * len(parts)
         self.place = {neuron: first + i for i, neuron in enumerate(neurons)}
-        self.child: dict[int, int] = {}
-        for number, part in enumerate(parts):
-            self.child.setdefault(part.parent, number)
+        self.heard = [_children(parts, number, children) for number in range(len(parts))]
         kinds = [NEURONS[int(self._gene("kind", neuron))] for neuron in neurons]
         self.alike = {kind: np.flatnonzero(np.array(kinds) == kind) for kind in set(kinds)}
         wires = [self._wires(neuron) for neuron in neurons]
@@ -200,9 +200,9 @@ class BrainReference:
         if code <= SENSORS:
             return self._sensor(part, code - 1)
         code -= 1 + SENSORS
-        owners = (part, self.parts[part].parent if part else None, self.child.get(part))
-        if code >= 3 * self.local:
-            return self.place[CENTRE, code - 3 * self.local], 1.0
+        owners = (part, self.parts[part].parent if part else None, *self.heard[part])
+        if code >= len(owners) * self.local:
+            return self.place[CENTRE, code - len(owners) * self.local], 1.0
         owner = owners[code // self.local]
         return (0, 1.0) if owner is None else (self.place[owner, code % self.local], 1.0)
 
@@ -243,6 +243,12 @@ class BrainReference:
         return np.reshape(own, (-1, 2, 3)) * np.reshape(flips, (-1, 1, 3))
 
 
+def _children(parts: Sequence[Part], parent: int, count: int) -> list[int | None]:
+    """Return the numbers of a part's first children, in order; None for each that it lacks."""
+    own = [number for number, part in enumerate(parts) if part.parent == parent]
+    return [*own, *[None] * count][:count]
+
+
 def _sign(part: Part, hinge: int) -> float:
     """Return -1 for hinges of a mirror image, except about the axis of mirroring; else 1."""
     return -1.0 if part.mirrored and part.hinges[hinge] != 1 else 1.0
@@ -268,5 +274,13 @@ def _reference(
     parts = grow(genome, settings.parts, settings.links)
     numbers = [name.removeprefix("part").split("_") for name in names]
     hinges = [(int(part), int(hinge)) for part, hinge in numbers]
-    every, skill, touch = settings.every, settings.skill, settings.touch
-    return BrainReference(genome, parts, hinges, step, every, skill, touch)
+    return BrainReference(
+        genome,
+        parts,
+        hinges,
+        step,
+        every=settings.every,
+        skill=settings.skill,
+        touch=settings.touch,
+        children=settings.children,
+    )

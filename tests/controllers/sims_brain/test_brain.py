@@ -1,7 +1,7 @@
 """Brains as arrays give the same outputs as a plain network, for any genes."""
 
 import dataclasses
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import jax
@@ -11,10 +11,12 @@ import pytest
 from controllers.sims_brain.made_up import one
 
 from mjxgait.controllers.sims_brain.brain import (
+    NOTHING,
     Brain,
     Perceived,
     blank,
     brain_step,
+    first_neuron,
     neuron_step,
     wired,
 )
@@ -26,16 +28,16 @@ from mjxgait.controllers.sims_brain.genotype import (
 from mjxgait.controllers.sims_brain.operators import Genotype, GraphOperators
 from mjxgait.controllers.sims_brain.phenotype import GrownBody, body_of
 from mjxgait.controllers.sims_brain.reference import BrainReference, fire
-from mjxgait.controllers.sims_brain.reference_body import NEURONS, grow
+from mjxgait.controllers.sims_brain.reference_body import NEURONS, SENSORS, grow
 from mjxgait.evolution.chance import key_of
 from mjxgait.rendering.brain import READS, draw_brain, kind_of, network_of, shape
 from mjxgait.rendering.curves import figure
 from mjxgait.training.experiment import arrays_of
 
 CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(steer=True, skills=3), 200, 0.01
-OPERATORS = GraphOperators(CAPACITY, ROOM, Ranges())
 NEURON_STEP = jax.jit(neuron_step, static_argnums=3)
-CREATE = jax.jit(jax.vmap(OPERATORS.create))
+HEARING = dataclasses.replace(ROOM, children=3)
+"""The same room, in which a part hears three children."""
 BRAIN_STEP = jax.jit(
     jax.vmap(lambda brain, mind, seen, skill: brain_step(brain, mind, seen, STEP, skill))
 )
@@ -43,16 +45,30 @@ NEURONS_IN_ALL = CAPACITY.parts * ROOM.local + ROOM.central
 
 
 @jax.jit
-@jax.vmap
-def born(genotype: Genotype) -> tuple[GrownBody, Brain]:
-    """Bodies and brains of genotypes [COUNT]; all tests share these programs."""
-    body = body_of(genotype.graph, CAPACITY)
-    return body, wired(genotype.nerves, genotype.centre, body, ROOM)
+def grown(genotypes: Genotype) -> GrownBody:
+    """Bodies of genotypes [COUNT]; all tests share this program."""
+    return jax.vmap(lambda genotype: body_of(genotype.graph, CAPACITY))(genotypes)
 
 
-def drawn(seed: int) -> Genotype:
+@partial(jax.jit, static_argnums=2)
+def _wired(genotypes: Genotype, bodies: GrownBody, room: NerveRoom) -> Brain:
+    return jax.vmap(lambda own, body: wired(own.nerves, own.centre, body, room))(genotypes, bodies)
+
+
+def born(genotypes: Genotype, room: NerveRoom = ROOM) -> tuple[GrownBody, Brain]:
+    """Bodies and brains of genotypes [COUNT]."""
+    bodies = grown(genotypes)
+    return bodies, _wired(genotypes, bodies, room)
+
+
+@partial(jax.jit, static_argnums=1)
+def _drawn(keys: jax.Array, room: NerveRoom) -> Genotype:
+    return jax.vmap(GraphOperators(CAPACITY, room, Ranges()).create)(keys)
+
+
+def drawn(seed: int, room: NerveRoom = ROOM) -> Genotype:
     """Random genotypes [COUNT]."""
-    return jax.device_get(CREATE(jax.random.split(key_of(seed), COUNT)))
+    return jax.device_get(_drawn(jax.random.split(key_of(seed), COUNT), room))
 
 
 @pytest.mark.parametrize("name", NEURONS)
@@ -78,14 +94,15 @@ def test_any_input_gives_a_finite_value():
         assert np.isfinite(kept).all(), NEURONS[kind]
 
 
-def test_a_brain_matches_its_reference_controller():
+@pytest.mark.parametrize("room", [ROOM, HEARING], ids=["one child", "three children"])
+def test_a_brain_matches_its_reference_controller(room: NerveRoom):
     """The two may differ where a threshold is met within rounding, in fewer than 3 % of brains."""
-    genotypes = drawn(3)
-    bodies, brains = jax.device_get(born(genotypes))
+    genotypes = drawn(3, room)
+    bodies, brains = jax.device_get(born(genotypes, room))
     skills = np.arange(COUNT) % ROOM.skills
     minds = repeated(blank(NEURONS_IN_ALL))
     links, references = zip(
-        *(reference(one(genotypes, i), one(bodies, i), skills[i]) for i in range(COUNT)),
+        *(reference(one(genotypes, i), one(bodies, i), skills[i], room) for i in range(COUNT)),
         strict=True,
     )
     memories = [t.init(1) for t in references]
@@ -111,6 +128,27 @@ def test_a_brain_matches_its_reference_controller():
     assert driven > COUNT
     assert np.median(wrong) < 1e-5
     assert np.mean(wrong > 1e-2) < 0.03
+
+
+def test_a_part_hears_its_first_children_in_order():
+    """The three inputs of each neuron are the neurons of its place in three children."""
+    genotypes, local = drawn(13, HEARING), HEARING.local
+    codes = 1 + SENSORS + local * (2 + np.arange(3)) + np.arange(local)[:, None]
+    source = np.broadcast_to(codes, genotypes.nerves.source.shape)
+    nerves = dataclasses.replace(genotypes.nerves, source=source)
+    bodies, brains = jax.device_get(born(dataclasses.replace(genotypes, nerves=nerves), HEARING))
+    first, heard, beyond = first_neuron(CAPACITY.links), np.zeros(3, int), 0
+    for body, brain in ((one(bodies, i), one(brains, i)) for i in range(COUNT)):
+        for part in np.flatnonzero(body.parts.exists):
+            own = (np.flatnonzero(body.parts.exists[1:] & (body.parts.parent[1:] == part)) + 1)[:3]
+            wanted = np.full((3, local), NOTHING)
+            wanted[: len(own)] = first + own[:, None] * local + np.arange(local)
+            found = brain.source[part * local : (part + 1) * local]
+            np.testing.assert_array_equal(found, wanted.T)
+            heard[: len(own)] += 1
+            beyond += len(own) < 3
+    assert (heard > 3).all()
+    assert beyond > COUNT
 
 
 def test_the_reference_brains_values_and_memory_are_separate_arrays():
@@ -141,17 +179,19 @@ def test_each_skill_has_effectors_of_its_own():
     np.testing.assert_array_equal(first.column, second.column)
 
 
-def brain_of(genotype: Genotype, skill: int = 0) -> BrainReference:
+def brain_of(genotype: Genotype, skill: int = 0, room: NerveRoom = ROOM) -> BrainReference:
     """The reference brain for the body of a genotype, without the arrays."""
     genome = arrays_of(genotype)
     parts = grow(genome, CAPACITY.parts, CAPACITY.links)
     hinges = [(p, h) for p, part in enumerate(parts) for h in range(len(part.hinges))]
-    return BrainReference(genome, parts, hinges, STEP, skill=skill)
+    return BrainReference(genome, parts, hinges, STEP, skill=skill, children=room.children)
 
 
-def reference(genotype: Genotype, body: GrownBody, skill: int) -> tuple[list[int], BrainReference]:
+def reference(
+    genotype: Genotype, body: GrownBody, skill: int, room: NerveRoom
+) -> tuple[list[int], BrainReference]:
     """The links of all hinges, part by part, and the brain that drives them."""
-    plain = brain_of(genotype, skill)
+    plain = brain_of(genotype, skill, room)
     links = [
         int(np.flatnonzero((body.part == p) & (body.hinge == h) & (body.tree.moves > 0))[0])
         for p, h in plain.hinges
