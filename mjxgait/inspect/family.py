@@ -133,18 +133,35 @@ def _relative(generation: int, born: Newborns, at: int) -> Relative:
 def mixed(child: Relative, mother: Relative, father: Relative) -> str:
     """Return how a father left nodes in a child: crossover, grafting, or not at all (mutation).
 
-    The record has no operator: a node of the father is found in its own place after a crossover and
-    in a free place of the mother after grafting.
+    The record has no operator. A node of the father in another place than its own was grafted, and
+    one in a place that the mother's body uses was crossed. One in its own place that the mother's
+    body does not use was crossed only if a connection of the father leads to it, from a node that
+    both parents have: a graft attaches it to a node of the mother.
     """
-    found = set()
+    found: dict[int, bool] = {}  # nodes of the father: whether each is in its own place
+    shared = []
     for node in connected(child.body):
         of_mother = _alike(child.body, node, mother.body, node)
         likest = [_alike(child.body, node, father.body, other) for other in _nodes(father.body)]
         best = int(np.argmax(likest))
         if likest[best] > max(of_mother, 0.5):
-            crossed = likest[node] == likest[best]
-            found.add(CROSSED if crossed else GRAFTED)
-    return GRAFTED if GRAFTED in found else CROSSED if found else WORDS[Origin.MUTATION]
+            found[node] = likest[node] == likest[best]
+        elif likest[node] == of_mother:
+            shared.append(node)
+    if not found:
+        return WORDS[Origin.MUTATION]
+    crossed = all(found.values()) and (
+        any(node in found for node in connected(mother.body))
+        or _leads(child.body, father.body, shared, list(found))
+    )
+    return CROSSED if crossed else GRAFTED
+
+
+def _leads(child: Body, parent: Body, sources: list[int], targets: list[int]) -> bool:
+    """Return whether a connection of the child from sources to targets is one of the parent."""
+    used, target = (f"{GRAPH_PREFIX}{name}" for name in ("used", "target"))
+    same = (child[used] > 0) & (parent[used] > 0) & (child[target] == parent[target])
+    return bool((same & np.isin(child[target], targets))[sources].any())
 
 
 def connected(body: Body) -> list[int]:

@@ -16,6 +16,8 @@ from mjxgait.config.tables import (
 from mjxgait.controllers.config import check_every
 
 Room = Annotated[int, pydantic.Field(ge=1), SHAPE]
+Graft = Literal["root", "any"]
+CentreOf = Literal["mother", "either"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,6 +44,10 @@ class BrainConfig:
         of values that change and, up to 1, the chances `connect` and `grow`.
       crossover: share of two-parent offspring with crossed nodes.
       grafting: share with a graft of the second parent; the others have one parent.
+      graft: node of the second parent that a graft attaches, with all that it reaches: "root" for
+        the first, "any" for any connected one, all equally likely.
+      centre: parent that gives the central neurons of crossed and grafted offspring; "either"
+        takes all of one parent, both equally likely.
       evolves: what offspring may inherit changed. "brain": bodies stay as first drawn. "steering":
         only the weights of `steer` change.
       steer: whether the light's direction also acts on each hinge directly, past the neurons; ours,
@@ -71,6 +77,8 @@ class BrainConfig:
     strength: tuple[Positive, Positive] = (1.0, 1.0)
     crossover: Fraction = 0.3
     grafting: Fraction = 0.3
+    graft: Annotated[Graft, SHAPE, ADDED] = "root"
+    centre: Annotated[CentreOf, SHAPE, ADDED] = "mother"
     evolves: Annotated[Literal["all", "brain", "steering"], ADDED] = "all"
     steer: Annotated[bool, SHAPE, ADDED] = False
     collide: Annotated[bool, SHAPE, ADDED] = False

@@ -21,7 +21,7 @@ from mjxgait.controllers.sims_brain.brain import (
 )
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.genotype import Capacity, NerveRoom, Ranges
-from mjxgait.controllers.sims_brain.operators import Genotype, GraphOperators, Rates
+from mjxgait.controllers.sims_brain.operators import Genotype, GraphOperators, Mating, Rates
 from mjxgait.controllers.sims_brain.phenotype import body_of
 from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.creature.body import Body
@@ -85,7 +85,8 @@ class Brains:
             resize=settings.resize,
             strength=settings.strength,
         )
-        operators = GraphOperators(self.capacity, self.room, Ranges(), rates)
+        mating = Mating(graft=settings.graft, centre=settings.centre)
+        operators = GraphOperators(self.capacity, self.room, Ranges(), rates, mating)
 
         def create(key: jax.Array, count: int) -> Genotype:
             return jax.vmap(operators.create)(jax.random.split(key, count))

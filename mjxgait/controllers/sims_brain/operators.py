@@ -9,7 +9,7 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 
-from mjxgait.controllers.sims_brain.config import BrainConfig
+from mjxgait.controllers.sims_brain.config import BrainConfig, CentreOf, Graft
 from mjxgait.controllers.sims_brain.genotype import (
     STEER,
     Capacity,
@@ -63,6 +63,14 @@ class Rates:
 
 
 @dataclasses.dataclass(frozen=True)
+class Mating:
+    """What a child of two takes from its father. graft, centre: see `BrainConfig`."""
+
+    graft: Graft = BrainConfig.graft
+    centre: CentreOf = BrainConfig.centre
+
+
+@dataclasses.dataclass(frozen=True)
 class GraphOperators:
     """Operators and limits that all genotypes of a population share."""
 
@@ -70,6 +78,7 @@ class GraphOperators:
     room: NerveRoom
     ranges: Ranges
     rates: Rates = Rates()
+    mating: Mating = Mating()
 
     def create(self, key: jax.Array) -> Genotype:
         """Draw a random genotype."""
@@ -98,13 +107,16 @@ class GraphOperators:
         points = numbered(jax.random.uniform(key, (2,)), nodes + 1)
         low, high = points.min(), points.max()
         order = jnp.arange(nodes)
-        return _chosen((order < low) | (order >= high), mother, father)
+        child = _chosen((order < low) | (order >= high), mother, father)
+        return dataclasses.replace(child, centre=self._centre(key, mother, father))
 
     def graft(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
         """Return the mother with the father's graph attached to one of her connections.
 
-        The father's nodes take the mother's unconnected nodes, as far as there is room.
+        The father's nodes take the mother's unconnected nodes, as far as there is room. Without
+        any room the child is the mother.
         """
+        father = self._scion(key, father)
         nodes, connections = mother.graph.target.shape
         free = ~reachable(mother.graph)
         place = jnp.argsort(~free, stable=True)  # targets of the father's nodes: free ones first
@@ -122,8 +134,23 @@ class GraphOperators:
             target=graph.target.at[at].set(place[0]),
             used=graph.used.at[at].set(True),
         )
-        grafted = dataclasses.replace(hung, graph=joined)
+        centre = self._centre(key, mother, father)
+        grafted = dataclasses.replace(hung, graph=joined, centre=centre)
         return choose(free.any(), grafted, mother)
+
+    def _scion(self, key: jax.Array, father: Genotype) -> Genotype:
+        """Return the father with the node that a graft attaches as its first."""
+        if self.mating.graft == "root":
+            return father
+        drawn = jax.random.uniform(jax.random.fold_in(key, 1), father.graph.joint.shape)
+        return _led_by(jnp.argmax(jnp.where(reachable(father.graph), drawn, -1.0)), father)
+
+    def _centre(self, key: jax.Array, mother: Genotype, father: Genotype) -> Centre:
+        """Return the central neurons of a child of two: those of one of them, as a whole."""
+        if self.mating.centre == "mother":
+            return mother.centre
+        of_mother = jax.random.uniform(jax.random.fold_in(key, 2)) < 0.5
+        return choose(of_mother, mother.centre, father.centre)
 
     def _strength(self, key: jax.Array) -> jax.Array:
         """Draw the factor [] of one mutation."""
@@ -181,8 +208,8 @@ class GraphOperators:
         return found
 
 
-def reachable(graph: Graph) -> jax.Array:
-    """Return whether each node [N] is reachable from the first."""
+def reachable(graph: Graph, first: jax.Array | int = 0) -> jax.Array:
+    """Return whether each node [N] is reachable from the first, or from another."""
     nodes = graph.target.shape[0]
     leads = jnp.any(
         (graph.target[:, :, None] == jnp.arange(nodes)) & graph.used[:, :, None], axis=1
@@ -191,7 +218,21 @@ def reachable(graph: Graph) -> jax.Array:
     def wider(_: int, known: jax.Array) -> jax.Array:
         return known | jnp.any(leads & known[:, None], axis=0)
 
-    return jax.lax.fori_loop(0, nodes, wider, jnp.arange(nodes) == 0)
+    return jax.lax.fori_loop(0, nodes, wider, jnp.arange(nodes) == first)
+
+
+def _led_by(first: jax.Array, genotype: Genotype) -> Genotype:
+    """Return the genotype with this node as its first, and those that it does not reach as last.
+
+    A graft takes nodes in this order, as far as there is room.
+    """
+    graph = genotype.graph
+    numbers = jnp.arange(graph.joint.shape[0])
+    order = jnp.argsort(2 - reachable(graph, first) - (numbers == first), stable=True)
+    place = jnp.zeros_like(order).at[order].set(numbers)
+    graph, nerves = jax.tree.map(lambda leaf: leaf[order], (graph, genotype.nerves))
+    graph = dataclasses.replace(graph, target=place[graph.target])
+    return Genotype(graph, nerves, genotype.centre)
 
 
 def _one_of(chance: jax.Array, allowed: jax.Array) -> tuple[jax.Array, jax.Array]:
