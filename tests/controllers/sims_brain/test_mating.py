@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import jax
 import numpy as np
@@ -158,6 +159,12 @@ def test_another_choice_is_another_program(given: dict[str, str | int]):
     assert build(BrainConfig, stored, "test") == other.controller
     older = {name: value for name, value in stored.items() if name not in given}
     assert build(BrainConfig, older, "test") == BrainConfig()
+
+
+def test_the_papers_configuration_has_its_mating():
+    settings = resolve_config({}, "blocks", Path("sims")).controller
+    assert isinstance(settings, BrainConfig)
+    assert (settings.graft, settings.centre, settings.children) == ("any", "either", 3)
 
 
 def relative(genotypes: Genotype, place: int) -> Relative:
