@@ -1,15 +1,17 @@
 """A grown body is an ordinary creature: its two files load, and it stands on the ground."""
 
+import itertools
+
 import mujoco
 import numpy as np
 import pytest
 from controllers.sims_brain.made_up import CAPACITY, genome_of, one, random_graphs
 
-from mjxgait.controllers.sims_brain.reference_body import grow
+from mjxgait.controllers.sims_brain.reference_body import THEIRS, grow
 from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature.load import creature_of
 from mjxgait.errors import UserError
-from mjxgait.reference.overlap import overlaps
+from mjxgait.reference.overlap import neighbours, overlaps
 
 COUNT = 60
 
@@ -83,3 +85,18 @@ def test_blocks_of_a_grown_body_collide(grown_parts: list):
         touching = {tuple(sorted(names[g] for g in c.geom)) for c in data.contact}
         assert {tuple(sorted(pair)) for pair in found.pairs} == touching
     assert met > 10
+
+
+def test_overlap_within_an_opponent_is_not_the_bodys(grown_parts: list):
+    """Two bodies alike: of the blocks that are not joined, only the own ones can overlap."""
+    parts = max(grown_parts, key=len)
+    files = body_files(parts, "grown", 0.01, 9.81, 0.9, "on land", opponent=parts)
+    creature = creature_of(files)
+    model, apart = creature.model, {THEIRS: 0, "part": 0}
+    left_out = {frozenset(pair) for pair in neighbours(model, creature)}
+    for pair in itertools.combinations(range(1, model.nbody), 2):
+        for beginning in apart:
+            alike = all(model.body(body).name.startswith(beginning) for body in pair)
+            apart[beginning] += alike and frozenset(pair) not in left_out
+    assert apart["part"] > 3
+    assert apart[THEIRS] == 0
