@@ -195,7 +195,7 @@ def test_a_pair_of_limbs_is_mirrored():
 def test_rigid_joints_start_unbent():
     """A start bends every possible hinge; a rigid joint would stay bent for ever."""
     nobody: Any = None
-    weightless: Any = SimpleNamespace(rested=lambda tree, qpos: qpos)
+    weightless: Any = SimpleNamespace(prepared=lambda tree: tree, rested=lambda tree, qpos: qpos)
     bent = jnp.full(7 + CAPACITY.links - 1, 0.3)
     start = Starts(bent, *[jnp.zeros(1)] * 6)
     embody = jax.jit(lambda genome: GraphGrowth(CAPACITY).body(weightless, genome, start).qpos)
