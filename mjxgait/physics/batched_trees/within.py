@@ -112,7 +112,8 @@ class Pushing:
         lacking, pressed, force = self._guess(slip)
         guess = self._generalised(force)
         more = dot(self._slips(gained(guess)), self.touch.outward)
-        wanted, reached = jnp.sum(pressed * lacking, axis=0), jnp.sum(pressed * more, axis=0)
+        # XLA's CPU compiler refuses a reduction over many pairs in one kernel.
+        wanted, reached = total(list(pressed * lacking)), total(list(pressed * more))
         factor_of_all = jnp.clip(wanted / jnp.maximum(reached, LEAST), 0.0, MOST)
         return factor_of_all * jnp.stack(guess)
 
