@@ -87,7 +87,7 @@ def _nose(creature: Creature, state: State) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _contact(creature: Creature, state: State) -> np.ndarray:
-    """Return 1 for feet on the floor and, of bodies whose blocks observe it, on other blocks."""
+    """Return 1 for feet on the floor and, where the controller observes it, on other blocks."""
     gap = np.minimum(state.foot_height, state.own_gap) if state.own_gap.size else state.foot_height
     return (gap < CONTACT_GAP).astype(float)
 

@@ -30,7 +30,7 @@ class BrainConfig:
       parts: most parts of a body.
       links: most links of a body; a part needs a link per hinge, and at least one.
       local: neurons of each node.
-      children: child parts whose neurons a part can hear, the first ones in order of growth. A node
+      children: child parts that a part can hear the neurons of, the first in order of growth. A node
         with 3 connections has 6 child parts at most, for each may grow a mirrored pair.
       central: neurons of no node.
       every: control steps per command; a brain takes two steps of its own per command.

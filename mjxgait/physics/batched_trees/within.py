@@ -87,7 +87,7 @@ def nearest(touch: OwnTouch, links: int) -> jax.Array:
 
 @dataclasses.dataclass(frozen=True)
 class Pushing:
-    """A step of a body whose blocks push each other.
+    """A step of a body with blocks that push each other.
 
     turns, freedom: motions of the root and of the hinges. mass: rows. step: s.
     """

@@ -1,4 +1,4 @@
-"""Modular swimmers whose bodies and brains evolve, through the same run as all creatures.
+"""Modular swimmers with bodies and brains that evolve, through the same run as all creatures.
 
 Their blocks push and feel each other, which other tests leave at the default.
 """
