@@ -52,19 +52,27 @@ class Boxes:
 
     def nearest(self, point: Vector) -> Vector:
         """Return the point of the core that is nearest to a point."""
-        away, hull = minus(point, self.middle), self.hull
-        along = [
-            jnp.clip(dot(axis, away), hull - half, half - hull)
-            for axis, half in zip(self.axes, self.half, strict=True)
-        ]
-        return _vector(
-            middle + total([a * axis[c] for a, axis in zip(along, self.axes, strict=True)])
-            for c, middle in enumerate(self.middle)
-        )
+        x, y, z = self.half
+        core = (x - self.hull, y - self.hull, z - self.hull)
+        return nearest_in_box(self.middle, self.axes, core, point)
 
     def velocity(self, arm: Vector) -> Vector:
         """Return the velocity of the point at an arm from the middle."""
-        return _vector(plus(self.drift, cross(self.spin, arm)))
+        return vector(plus(self.drift, cross(self.spin, arm)))
+
+
+def nearest_in_box(
+    middle: Vector, own: tuple[Vector, Vector, Vector], half: Vector, point: Vector
+) -> Vector:
+    """Return the point of a box that is nearest to a point. own: its axes. half: m along these."""
+    away = minus(point, middle)
+    along = [
+        jnp.clip(dot(axis, away), -reach, reach) for axis, reach in zip(own, half, strict=True)
+    ]
+    return vector(
+        m + total([a * axis[c] for a, axis in zip(along, own, strict=True)])
+        for c, m in enumerate(middle)
+    )
 
 
 def pushes(one: Boxes, other: Boxes, step: float, pin: Pin) -> tuple[jax.Array, jax.Array]:
@@ -75,15 +83,15 @@ def pushes(one: Boxes, other: Boxes, step: float, pin: Pin) -> tuple[jax.Array, 
     a: Boxes = jax.tree.map(lambda leaf: leaf[:, None], one)
     b: Boxes = jax.tree.map(lambda leaf: leaf[None], other)
     here, there = _nearest_points(a, b, pin)
-    between = _vector(minus(a.middle, b.middle))
-    outward, distance = pin(_direction(_vector(minus(here, there)), between))
+    between = vector(minus(a.middle, b.middle))
+    outward, distance = pin(_direction(vector(minus(here, there)), between))
     depth = a.hull + b.hull - distance
     touching = (depth > 0) & (a.solid * b.solid > 0)
-    at = _vector(0.5 * (x + y) for x, y in zip(here, there, strict=True))
-    mine, its = _vector(minus(at, a.middle)), _vector(minus(at, b.middle))
-    slip = pin(_vector(minus(a.velocity(mine), b.velocity(its))))
+    at = vector(0.5 * (x + y) for x, y in zip(here, there, strict=True))
+    mine, its = vector(minus(at, a.middle)), vector(minus(at, b.middle))
+    slip = pin(vector(minus(a.velocity(mine), b.velocity(its))))
     pulled = _force(slip, outward, depth, a.mass * b.mass / (a.mass + b.mass + NEAR), step)
-    force = pin(_vector(jnp.where(touching, f, 0.0) for f in pulled))
+    force = pin(vector(jnp.where(touching, f, 0.0) for f in pulled))
     ours, theirs = (*cross(mine, force), *force), (*cross(its, force), *force)
     first, second = range(len(one.mass)), range(len(other.mass))
     on_one = [total([x[:, j] for j in second]) for x in ours]
@@ -93,7 +101,7 @@ def pushes(one: Boxes, other: Boxes, step: float, pin: Pin) -> tuple[jax.Array, 
 
 def _nearest_points(a: Boxes, b: Boxes, pin: Pin) -> tuple[Vector, Vector]:
     """Return the nearest points of the cores of each pair, components [n, m, L]."""
-    there = _vector(y + 0.0 * x for x, y in zip(a.middle, b.middle, strict=True))
+    there = vector(y + 0.0 * x for x, y in zip(a.middle, b.middle, strict=True))
     here = there
     for _ in range(PROJECTIONS):
         here = pin(a.nearest(there))
@@ -106,7 +114,7 @@ def _direction(apart: Vector, between: Vector) -> tuple[Vector, jax.Array]:
     distance = jnp.sqrt(dot(apart, apart))
     met, length = distance < NEAR, jnp.sqrt(dot(between, between)) + NEAR
     safe = jnp.where(met, 1.0, distance)
-    outward = _vector(
+    outward = vector(
         jnp.where(met, middle / length, x / safe) for x, middle in zip(apart, between, strict=True)
     )
     return outward, distance
@@ -116,15 +124,15 @@ def _force(slip: Vector, outward: Vector, depth: jax.Array, mass: jax.Array, ste
     """Return the force on the first block. slip: m/s against the other. mass: kg, reduced."""
     time, leaving = STEPS * step, dot(slip, outward)
     normal = jnp.maximum(mass / time**2 * depth - mass / time * leaving, 0.0)
-    along = _vector(s - leaving * o for s, o in zip(slip, outward, strict=True))
+    along = vector(s - leaving * o for s, o in zip(slip, outward, strict=True))
     speed = jnp.sqrt(dot(along, along)) + NEAR
     grip = jnp.minimum(FRICTION * normal, SHARE * mass / step * speed) / speed
-    return _vector(normal * o - grip * a for o, a in zip(outward, along, strict=True))
+    return vector(normal * o - grip * a for o, a in zip(outward, along, strict=True))
 
 
 def gap(boxes: Boxes, point: Vector) -> jax.Array:
     """Return the distance [L] in m from a point, components [L], to the nearest block."""
-    away = _vector(p[None] - m for p, m in zip(point, boxes.middle, strict=True))
+    away = vector(p[None] - m for p, m in zip(point, boxes.middle, strict=True))
     beyond = [
         jnp.maximum(abs(dot(axis, away)) - half, 0.0)
         for axis, half in zip(boxes.axes, boxes.half, strict=True)
@@ -133,6 +141,7 @@ def gap(boxes: Boxes, point: Vector) -> jax.Array:
     return jnp.min(jnp.where(boxes.solid > 0, distance, jnp.inf), axis=0)
 
 
-def _vector(components: Iterable[Scalar]) -> Vector:
+def vector(components: Iterable[Scalar]) -> Vector:
+    """Return three components as a vector."""
     x, y, z = components
     return x, y, z

@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.physics.batched_trees.collision import FRICTION, NEAR
+from mjxgait.physics.batched_trees.collision import FRICTION, NEAR, nearest_in_box, vector
 from mjxgait.physics.batched_trees.dynamics import generalised, joints_between, velocities
 from mjxgait.physics.batched_trees.tree import FAR, Tree, centres, frames
 from mjxgait.physics.lane_major.kinematics import Motion, Pose
@@ -152,6 +152,10 @@ class _Boxes:
     own: tuple[Vector, Vector, Vector]
     half: Vector
 
+    def nearest(self, point: Vector) -> Vector:
+        """Return the point of each block that is nearest to a point."""
+        return nearest_in_box(self.middle, self.own, self.half, point)
+
 
 def _way_out(a: _Boxes, b: _Boxes) -> tuple[Vector, jax.Array, Vector]:
     """Return the shortest way out along a normal of either block: direction, length and place.
@@ -171,32 +175,17 @@ def _way_out(a: _Boxes, b: _Boxes) -> tuple[Vector, jax.Array, Vector]:
     for longer, axis in ways[1:]:
         shorter = longer < depth
         depth = jnp.where(shorter, longer, depth)
-        best = _vector([jnp.where(shorter, x, y) for x, y in zip(axis, best, strict=True)])
+        best = vector([jnp.where(shorter, x, y) for x, y in zip(axis, best, strict=True)])
     sign = jnp.where(dot(best, between) < 0, -1.0, 1.0)
-    outward = _vector(scale(sign, best))
+    outward = vector(scale(sign, best))
     return outward, depth, _middle_of_both(a, b)
 
 
 def _middle_of_both(a: _Boxes, b: _Boxes) -> Vector:
     """Return a point between two blocks: each one's nearest to the other's middle, then halfway."""
-    here, there = _nearest(a, b.middle), _nearest(b, a.middle)
-    here, there = _nearest(a, there), _nearest(b, here)
-    return _vector([0.5 * (x + y) for x, y in zip(here, there, strict=True)])
-
-
-def _nearest(box: _Boxes, point: Vector) -> Vector:
-    """Return the point of a block that is nearest to a point."""
-    away = minus(point, box.middle)
-    along = [
-        jnp.clip(dot(axis, away), -half, half) for axis, half in zip(box.own, box.half, strict=True)
-    ]
-    reached = [scale(x, axis) for x, axis in zip(along, box.own, strict=True)]
-    return _vector([m + total([r[c] for r in reached]) for c, m in enumerate(box.middle)])
-
-
-def _vector(components: Sequence[Scalar]) -> Vector:
-    x, y, z = components
-    return x, y, z
+    here, there = a.nearest(b.middle), b.nearest(a.middle)
+    here, there = a.nearest(there), b.nearest(here)
+    return vector([0.5 * (x + y) for x, y in zip(here, there, strict=True)])
 
 
 def _spans(count: int) -> Iterator[tuple[int, int]]:
