@@ -123,8 +123,28 @@ def evaluate(
     return LocalEvaluator(spec.simulator(numbers)).evaluate(genomes, starts, settings, requested)
 
 
+def evaluate_small(
+    spec: SimulatorSpec,
+    numbers: BodyParams | None,
+    settings: Config,
+    starts: Starts,
+    genomes: object,
+    requested: RequestedTrials,
+) -> RequestedTrials:
+    """Evaluate the small bodies among genomes [B, N, ...]; return the request of the others."""
+    assert spec.small is not None
+    return spec.small.evaluate(genomes, starts, settings, requested)
+
+
 def first_trials(states: EvolutionState, proposals: Proposal) -> RequestedTrials:
     """Request the first trial of every individual, with no known results; reads shapes only."""
+    every = all_trials(states, proposals)
+    first = np.arange(states.terms.shape[2]) == 0
+    return RequestedTrials(np.broadcast_to(first, every.wanted.shape), every.known)
+
+
+def all_trials(states: EvolutionState, proposals: Proposal) -> RequestedTrials:
+    """Request all trials of every individual, with no known results; reads shapes only."""
     shape = (*proposals.born.shape, states.terms.shape[2])
 
     def nothing(values: jax.Array) -> Any:
@@ -133,7 +153,7 @@ def first_trials(states: EvolutionState, proposals: Proposal) -> RequestedTrials
     failed: Any = np.zeros(shape, bool)
     spent: Any = np.zeros(shape[0], np.int32)
     known = Evaluation(nothing(states.terms), nothing(states.outcome), failed, spent, spent)
-    return RequestedTrials(np.broadcast_to(np.arange(shape[2]) == 0, shape), known)
+    return RequestedTrials(np.ones(shape, bool), known)
 
 
 def promote(

@@ -4,11 +4,14 @@ import dataclasses
 import functools
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
 from mjxgait.config.schema import Config
+from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.controller import OPPONENT, Brains, capacity_of
-from mjxgait.controllers.sims_brain.genotype import Capacity
+from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
+from mjxgait.controllers.sims_brain.growth import grown
 from mjxgait.controllers.sims_brain.operators import Genotype
 from mjxgait.controllers.sims_brain.opponent import acting, arena_of
 from mjxgait.controllers.sims_brain.phenotype import anatomy, body_of
@@ -26,6 +29,7 @@ from mjxgait.physics.batched_trees.tree import Medium, Surroundings
 from mjxgait.plugins import make_controller, make_task
 from mjxgait.plugins.registry import what_ends
 from mjxgait.simulation.rollout import Simulator
+from mjxgait.simulation.small import SmallBodies
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.simulator import BodyParams, Growth, assembled
 
@@ -82,13 +86,28 @@ class GrownSpec:
         """See `SimulatorSpec`."""
         return self.simulator()
 
+    @property
+    def small(self) -> SmallBodies | None:
+        """See `SimulatorSpec`."""
+        settings: Any = self.config.controller
+        if not 0 < settings.small < settings.links:
+            return None
+        parts = min(settings.parts, settings.small)
+        less = dataclasses.replace(settings, parts=parts, links=settings.small)
+        config = dataclasses.replace(self.config, controller=less)
+        return SmallBodies(self._with_room(config), functools.partial(_fits, settings))
+
     def embodied(self, starts: Starts) -> Starts:
         """See `SimulatorSpec`."""
         return starts
 
     def simulator(self, numbers: BodyParams | None = None) -> Simulator:
         """See `SimulatorSpec`."""
-        config, step = self.config, float(self.creature.model.opt.timestep)
+        return self._with_room(self.config)
+
+    def _with_room(self, config: Config) -> Simulator:
+        """Return the simulator of bodies for which a config has room."""
+        step = float(self.creature.model.opt.timestep)
         settings: Any = config.controller
         capacity = capacity_of(settings)
         body = anatomy(capacity.links)
@@ -114,3 +133,13 @@ class GrownSpec:
         assert isinstance(controller, Brains)
         arena = ArenaPlant(plant, acting(controller, body), controller.every)
         return assembled(body, step, arena, *given, ArenaGrowth(controller))
+
+
+def _fits(settings: BrainConfig, genome: Genotype) -> jax.Array:
+    """Return whether [] a body, and its opponent's, have few enough links for a smaller program."""
+
+    def fits(graph: Graph) -> jax.Array:
+        return jnp.max(grown(graph, capacity_of(settings)).last) < settings.small
+
+    theirs = genome.opponent
+    return fits(genome.graph) if theirs is None else fits(genome.graph) & fits(theirs.graph)

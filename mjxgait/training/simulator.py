@@ -14,6 +14,7 @@ from mjxgait.controllers.spd import Drive
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends, GivenBody
 from mjxgait.simulation.rollout import AXIS, Simulator
+from mjxgait.simulation.small import SmallBodies
 from mjxgait.tasks.base import Task
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Plant, pytree
@@ -55,6 +56,11 @@ class SimulatorSpec(Protocol):
     @property
     def own(self) -> Simulator:
         """The simulator with constant body parameters, for the host's own queries."""
+        ...
+
+    @property
+    def small(self) -> SmallBodies | None:
+        """What simulates small bodies; None if one program simulates all."""
         ...
 
     def embodied(self, starts: Starts) -> Starts:

@@ -87,6 +87,11 @@ class ModelSpec:
         single = jax.tree.map(lambda x: np.asarray(x, np.float32), self.plant.parameters)
         return BodyParams(given_body(self.creature), given_ends(ends), single)
 
+    @property
+    def small(self) -> None:
+        """See `SimulatorSpec`."""
+        return None
+
     @functools.cached_property
     def own(self) -> Simulator:
         """The simulator with constant body parameters, for the host's own queries."""

@@ -27,7 +27,9 @@ from mjxgait.tasks.starts import Starts
 from mjxgait.training.generation import (
     RunParams,
     absorb,
+    all_trials,
     evaluate,
+    evaluate_small,
     first_state,
     first_trials,
     promote,
@@ -95,13 +97,15 @@ def at_once(name: str) -> AbstractContextManager[object]:
 class CompiledGeneration:
     """Compiled programs of one shape; see `generation`.
 
-    evaluate: None if another evaluator is used. promote: None if all individuals run all trials.
+    evaluate: None if another evaluator is used. small: evaluates small bodies before all others;
+    None if `evaluate` simulates all. promote: None if all individuals run all trials.
     """
 
     propose: jax.stages.Compiled
     absorb: jax.stages.Compiled
     evaluate: jax.stages.Compiled | None = None
     promote: jax.stages.Compiled | None = None
+    small: jax.stages.Compiled | None = None
 
     def step(
         self,
@@ -118,6 +122,9 @@ class CompiledGeneration:
                 return evaluator.evaluate(proposals.offspring, starts, rows.settings, *requested)
             assert self.evaluate is not None, "compiled for an evaluator elsewhere"
             given = (numbers, rows.settings, starts, proposals.offspring)
+            if self.small is not None:
+                asked = requested or (all_trials(states, proposals),)
+                requested = (self.small(*given, *asked),)
             found: Evaluation = self.evaluate(*given, *requested)
             return found
 
@@ -155,12 +162,15 @@ def lower_stages(
     yield "propose", first
     proposals, starts = first.out_info
     promotes = rows.settings.rollout.promotes
-    requested = (first_trials(states, proposals),) if promotes else ()
-    given = (rows.settings, starts, proposals.offspring, *requested)
+    asked = all_trials(states, proposals)
+    small = evaluates and spec.small is not None
+    given = (rows.settings, starts, proposals.offspring, *((asked,) if promotes or small else ()))
     if evaluates:
         middle = lowered(spec, evaluate, *given)
         yield "evaluate", middle
         evaluation = middle.out_info
+        if small:
+            yield "small", lowered(spec, evaluate_small, *given)
     else:
         evaluation = jax.eval_shape(functools.partial(evaluate, spec), spec.numbers, *given)
     if promotes:
@@ -176,7 +186,10 @@ def compile_stages(
     long: whether proposing takes long (`Variation`). Crossover of expressions takes half a second
     compiled with "some" effort and three with the least; poses take a hundredth with either.
     """
-    efforts: dict[str, Effort] = {"propose": "some" if long else "least", "evaluate": "best"}
+    efforts: dict[str, Effort] = {
+        "propose": "some" if long else "least",
+        **dict.fromkeys(("evaluate", "small"), "best"),
+    }
 
     def in_turn(part: str, program: jax.stages.Lowered) -> jax.stages.Compiled:
         with turn(part):

@@ -4,6 +4,9 @@ import pytest
 from rendering.made_up import treading, write_run
 from web.browser import launch
 
+from mjxgait.rendering import video
+from mjxgait.web import page
+
 
 @pytest.fixture(scope="session")
 def stool_run(stool, tmp_path_factory):
@@ -23,3 +26,10 @@ def browser():
         chromium = launch(play)
         yield chromium
         chromium.close()
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Show fewer seconds of a walk."""
+    for module in (video, page):
+        monkeypatch.setattr(module, "LOOP_SECONDS", 5.0)

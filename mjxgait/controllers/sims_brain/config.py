@@ -29,6 +29,9 @@ class BrainConfig:
       connections: most connections of a node.
       parts: most parts of a body.
       links: most links of a body; a part needs a link per hinge, and at least one.
+      small: links up to which a body is simulated by a smaller program with room for just as many,
+        because a step takes as long as the room, not the body; 0 simulates all by one program. It
+        changes results in their last bits only.
       local: neurons of each node.
       children: child parts that a part can hear the neurons of, the first in order of growth. A node
         with 3 connections has 6 child parts at most, for each may grow a mirrored pair.
@@ -65,6 +68,7 @@ class BrainConfig:
     connections: Room = 3
     parts: Room = 12
     links: Annotated[int, pydantic.Field(ge=2), SHAPE] = 12
+    small: Annotated[int, pydantic.Field(ge=0), SHAPE, ADDED] = 0
     local: Room = 3
     children: Annotated[Room, ADDED] = 1
     central: Room = 4
