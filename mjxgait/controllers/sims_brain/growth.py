@@ -108,7 +108,7 @@ def _seed(graph: Graph, capacity: Capacity) -> _Growing:
     most = capacity.parts
     one = jnp.arange(most) == 0
     none = jnp.zeros(most, jnp.int32)
-    half = jnp.ones((most, 3)).at[0].set(_size(graph.half[0], jnp.float32(1.0)))
+    half = jnp.where(one[:, None], _size(graph.half[0], jnp.float32(1.0)), 1.0)
     axes, nowhere = jnp.tile(jnp.eye(3), (most, 1, 1)), jnp.zeros((most, 3))
     return _Growing(
         Parts(
@@ -125,7 +125,7 @@ def _seed(graph: Graph, capacity: Capacity) -> _Growing:
         boxes=Boxes(nowhere, half, axes),
         count=jnp.int32(1),
         links=jnp.int32(1),
-        branch=jnp.zeros((most, graph.half.shape[0]), jnp.int32).at[0, 0].set(1),
+        branch=jnp.outer(one, jnp.arange(graph.half.shape[0]) == 0).astype(jnp.int32),
         scale=jnp.ones(most),
     )
 
@@ -170,7 +170,7 @@ def _with_part(
     parts, boxes = growing.parts, growing.boxes
     target, times = graph.target[at], growing.branch[part]
     needed = _links(graph, target)
-    place = jnp.where(grows, growing.count, len(parts.node))  # out of bounds: dropped
+    here = (jnp.arange(len(parts.node)) == growing.count) & grows
     copies = parts.copies[part] ^ image
     scale = growing.scale[part] * graph.scale[at]
     joint, axes = joined(parts.half[part], graph.place[at], graph.turn[at])
@@ -182,7 +182,8 @@ def _with_part(
     crowded = (inside(box, boxes) > ROOM) & parts.exists & (jnp.arange(len(parts.node)) != part)
 
     def put(array: jax.Array, value: jax.Array) -> jax.Array:
-        return array.at[place].set(value, mode="drop")
+        # A scatter would take the compiler ten times as long.
+        return jnp.where(here.reshape(-1, *[1] * (array.ndim - 1)), value, array)
 
     grown = _Growing(
         Parts(
@@ -199,7 +200,7 @@ def _with_part(
         boxes=jax.tree.map(put, boxes, box),
         count=growing.count + grows,
         links=growing.links + jnp.where(grows, needed, 0),
-        branch=put(growing.branch, times.at[target].add(1)),
+        branch=put(growing.branch, times + (jnp.arange(len(times)) == target)),
         scale=put(growing.scale, scale),
     )
     return grown, ~(grows & crowded.any())
@@ -231,10 +232,11 @@ def joined(half: jax.Array, place: jax.Array, turn: jax.Array) -> tuple[jax.Arra
 
 def _about(axis: int, angle: jax.Array) -> jax.Array:
     """Return the axes (rows) after a turn about one of them."""
-    sin, cos = jnp.sin(angle), jnp.cos(angle)
+    along, across = np.zeros((2, 3, 3), np.float32)
+    along[axis, axis] = 1
     i, j = (axis + 1) % 3, (axis + 2) % 3
-    matrix = jnp.eye(3).at[i, i].set(cos).at[j, j].set(cos)
-    return matrix.at[i, j].set(sin).at[j, i].set(-sin)
+    across[i, j], across[j, i] = 1, -1
+    return jnp.cos(angle) * (np.eye(3) - along) + jnp.sin(angle) * across + along
 
 
 def _size(half: jax.Array, scale: jax.Array) -> jax.Array:

@@ -90,7 +90,7 @@ def _joints(
     chain = jnp.eye(links)
 
     def lengthened(link: jax.Array, chain: jax.Array) -> jax.Array:
-        return chain.at[link].add(chain[parent[link]] * is_child[link])
+        return chain + (numbers == link)[:, None] * chain[parent[link]] * is_child[link]
 
     return {
         "parent": one_hot.astype(jnp.float32),

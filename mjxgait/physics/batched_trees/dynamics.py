@@ -16,17 +16,13 @@ from mjxgait.physics.batched_trees.tree import (
     down,
     frames,
     hinges,
-    motions,
-    posture,
     root_motion,
-    root_turns,
     up,
 )
 from mjxgait.physics.derived import inverse_weights
 from mjxgait.physics.lane_major.dynamics import (
     Inertia,
     force_cross,
-    inertias,
     motion_cross,
     pack,
     rooted,
@@ -38,7 +34,6 @@ from mjxgait.physics.lane_major.lanes import (
     cross,
     dot,
     parts,
-    pinned_by,
     plus,
     scale,
     total,
@@ -135,33 +130,51 @@ def _root(turns: jax.Array) -> Motion:
 
 
 def weighed(tree: Tree) -> Tree:
-    """Return one body, arrays without lanes, with the weights of its blocks and hinges."""
-    lane = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32)[..., None], tree)
-    links, like = tree.links, jnp.ones(1, jnp.float32)
-    rest = jnp.zeros((links + 6, 1), jnp.float32).at[3].set(1.0)
-    pin = pinned_by(like)
-    poses = posture(lane, rest, pin)
-    freedom, turns = motions(lane, poses, pin), root_turns(poses)
-    body = inertias(lane, poses, like, pin)
-    rows = mass_rows(lane, turns, freedom, body, pin)
-    lower = jnp.stack([jnp.pad(row[:, 0], (0, len(rows) - len(row))) for row in rows])
-    mass = lower + jnp.tril(lower, -1).T
-    solid = jnp.where(lane.solid > 0, lane.mass, 1.0)[:, 0]
-    centre = jnp.stack([h[:, 0] for h in body.moment], axis=1) / solid[:, None]
-    spin = jnp.concatenate([jnp.zeros((3, 3)), jnp.eye(3), jnp.stack(freedom.spin)[:, 1:, 0].T])
-    shift = jnp.concatenate([jnp.eye(3), jnp.zeros((3, 3)), jnp.stack(freedom.shift)[:, 1:, 0].T])
+    """Return one body, arrays without lanes, with the weights of its blocks and hinges.
+
+    It runs once per body, so its loops are not unrolled: that would take the compiler longer than
+    the rest of a body's growth.
+    """
+    links = tree.links
+    rot, pos = _at_rest(tree)
+    axis = rot[:, 2] * tree.moves[:, None]
+    centre = pos + jnp.einsum("li,lij->lj", tree.com, rot, precision="highest")
+    centre = centre * tree.solid[:, None]
+    spin = jnp.concatenate([jnp.zeros((3, 3)), jnp.eye(3), axis[1:]])
+    shift = jnp.concatenate([jnp.eye(3), jnp.zeros((3, 3)), jnp.cross(pos, axis)[1:]])
     moves = jnp.concatenate([jnp.ones((links, 6)), tree.above[:, 1:]], axis=1)[:, :, None]
-    at_centre = (shift + jnp.cross(spin, centre[:, None])) * moves
-    jacobian = jnp.concatenate([at_centre, jnp.broadcast_to(spin, at_centre.shape) * moves], axis=2)
+    slides = (shift + jnp.cross(spin, centre[:, None])) * moves
+    turns = jnp.broadcast_to(spin, slides.shape) * moves
+    own = jnp.einsum("ldj,lki,lij->ldk", turns, tree.axes, rot, precision="highest")
+    still = jnp.concatenate([jnp.zeros(6), (tree.armature + 1 - tree.moves)[1:]])
+    mass = (
+        jnp.einsum("ldj,l,lej->de", slides, tree.mass, slides, precision="highest")
+        + jnp.einsum("ldk,lk,lek->de", own, tree.inertia, own, precision="highest")
+        + jnp.diag(still)
+    )
     body_weight, dof = inverse_weights(
         mass,
-        jnp.swapaxes(jacobian, 1, 2),
+        jnp.swapaxes(jnp.concatenate([slides, turns], axis=2), 1, 2),
         [range(3), range(3, 6), *([j] for j in range(6, 5 + links))],
     )
-    still = jnp.zeros(1)
     return dataclasses.replace(
-        tree, body_weight=body_weight[:, 0], dof_weight=jnp.concatenate([still, dof[6:]])
+        tree, body_weight=body_weight[:, 0], dof_weight=jnp.concatenate([jnp.zeros(1), dof[6:]])
     )
+
+
+def _at_rest(tree: Tree) -> tuple[jax.Array, jax.Array]:
+    """Return axes [n, 3, 3] (rows) and places [n, 3] of all links with all angles 0."""
+    root = jnp.concatenate([jnp.eye(3), jnp.zeros((1, 3))])  # axes, then the place
+
+    def placed(known: jax.Array, link: jax.Array) -> tuple[jax.Array, None]:
+        above = jnp.einsum("a,aij->ij", tree.parent[link], known, precision="highest")
+        steps = jnp.concatenate([tree.turn[link], tree.place[link][None]])
+        own = jnp.matmul(steps, above[:3], precision="highest").at[3].add(above[3])
+        return jnp.where((jnp.arange(tree.links) == link)[:, None, None], own, known), None
+
+    none = jnp.zeros((tree.links - 1, 4, 3))
+    known, _ = jax.lax.scan(placed, jnp.concatenate([root[None], none]), jnp.arange(1, tree.links))
+    return known[:, :3], known[:, 3]
 
 
 def drag_links(
