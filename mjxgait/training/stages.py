@@ -188,7 +188,8 @@ def compile_stages(
     """
     efforts: dict[str, Effort] = {
         "propose": "some" if long else "least",
-        **dict.fromkeys(("evaluate", "small"), "best"),
+        "evaluate": "best",
+        "small": "best",
     }
 
     def in_turn(part: str, program: jax.stages.Lowered) -> jax.stages.Compiled:

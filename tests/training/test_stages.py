@@ -21,9 +21,9 @@ def test_only_the_simulation_is_fully_optimized(
 ):
     """A proposal that takes long is optimized a little."""
     monkeypatch.setattr("jax.default_backend", lambda: "cpu")
-    written = [(part, Written()) for part in ("propose", "evaluate", "absorb")]
+    written = [(part, Written()) for part in ("propose", "evaluate", "small", "absorb")]
     stages = compile_stages(written, long=long)
-    assert stages.evaluate == {"xla_cpu_prefer_vector_width": "512"}
+    assert stages.evaluate == stages.small == {"xla_cpu_prefer_vector_width": "512"}
     assert stages.propose["xla_backend_optimization_level"] == level
     assert stages.absorb["xla_backend_optimization_level"] == "0"
 
