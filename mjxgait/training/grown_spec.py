@@ -86,7 +86,7 @@ class GrownSpec:
         """See `SimulatorSpec`."""
         return self.simulator()
 
-    @property
+    @functools.cached_property
     def small(self) -> SmallBodies | None:
         """See `SimulatorSpec`."""
         settings: Any = self.config.controller

@@ -30,8 +30,8 @@ class BrainConfig:
       parts: most parts of a body.
       links: most links of a body; a part needs a link per hinge, and at least one.
       small: links up to which a body is simulated by a smaller program with room for just as many,
-        because a step takes as long as the room, not the body; 0 simulates all by one program. It
-        changes results in their last bits only.
+        because a step takes as long as the room, not the body; 0 simulates all by one program. Sums
+        are rounded otherwise, and contacts with the ground amplify that.
       local: neurons of each node.
       children: child parts that a part can hear the neurons of, the first in order of growth. A node
         with 3 connections has 6 child parts at most, for each may grow a mirrored pair.

@@ -182,7 +182,7 @@ def _with_part(
     crowded = (inside(box, boxes) > ROOM) & parts.exists & (jnp.arange(len(parts.node)) != part)
 
     def put(array: jax.Array, value: jax.Array) -> jax.Array:
-        # A scatter would take the compiler ten times as long.
+        # Not a scatter, which takes the compiler longer.
         return jnp.where(here.reshape(-1, *[1] * (array.ndim - 1)), value, array)
 
     grown = _Growing(
